@@ -1,0 +1,57 @@
+# Flags that every target of ours is built with, and the shared precompiled headers.
+add_library(saccade_build_options INTERFACE)
+target_compile_features(saccade_build_options INTERFACE cxx_std_20)
+target_compile_options(saccade_build_options INTERFACE
+  -Wall -Wextra -Wpedantic -Werror -Wshadow -Wnon-virtual-dtor -march=x86-64-v3
+  # GCC 12 false positives inside Eigen, protobuf and <regex> once inlined.
+  -Wno-error=maybe-uninitialized -Wno-error=array-bounds -Wno-error=stringop-overflow
+  -Wno-error=stringop-overread -Wno-error=restrict -Wno-error=dangling-pointer -Wno-psabi)
+# Eigen objects keep malloc's alignment, whatever the instruction set (architecture, section 7).
+target_compile_definitions(saccade_build_options INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
+target_include_directories(saccade_build_options INTERFACE ${CMAKE_SOURCE_DIR})
+if(SACCADE_SANITIZER)
+  target_compile_options(saccade_build_options INTERFACE
+    -fsanitize=${SACCADE_SANITIZER} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(saccade_build_options INTERFACE -fsanitize=${SACCADE_SANITIZER})
+endif()
+
+# saccade_library(NAME SOURCES ... PUBLIC ... PRIVATE ... [PCH eigen|vision|rpc])
+# A static library that carries the build options. SYSTEM keeps generated headers out of -Werror.
+function(saccade_library name)
+  cmake_parse_arguments(ARG "" "PCH" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC saccade_build_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  saccade_precompile(${name} "${ARG_PCH}")
+endfunction()
+
+# saccade_executable(NAME SOURCES ... LIBS ... [PCH ...])
+function(saccade_executable name)
+  cmake_parse_arguments(ARG "" "PCH" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE saccade_build_options ${ARG_LIBS})
+  saccade_precompile(${name} "${ARG_PCH}")
+endfunction()
+
+function(saccade_precompile name kind)
+  if(kind STREQUAL "eigen")
+    target_precompile_headers(${name} REUSE_FROM saccade_pch_eigen)
+  elseif(kind STREQUAL "vision")
+    target_precompile_headers(${name} REUSE_FROM saccade_pch_vision)
+  elseif(kind STREQUAL "rpc")
+    target_precompile_headers(${name} REUSE_FROM saccade_pch_rpc)
+  elseif(kind)
+    message(FATAL_ERROR "saccade_precompile: unknown kind '${kind}'")
+  endif()
+endfunction()
+
+file(WRITE ${CMAKE_BINARY_DIR}/pch.cpp "namespace {}\n")
+foreach(kind eigen vision rpc)
+  add_library(saccade_pch_${kind} STATIC ${CMAKE_BINARY_DIR}/pch.cpp)
+  target_link_libraries(saccade_pch_${kind} PRIVATE saccade_build_options Eigen3::Eigen)
+endforeach()
+target_precompile_headers(saccade_pch_eigen PRIVATE <Eigen/Dense> <vector> <string> <memory>)
+target_link_libraries(saccade_pch_vision PRIVATE OpenCV::core OpenCV::imgproc)
+target_precompile_headers(saccade_pch_vision PRIVATE
+  <Eigen/Dense> <opencv2/core.hpp> <opencv2/imgproc.hpp> <vector> <string> <memory>)
+target_link_libraries(saccade_pch_rpc PRIVATE gRPC::grpc++)
+target_precompile_headers(saccade_pch_rpc PRIVATE <grpcpp/grpcpp.h> <memory> <string>)

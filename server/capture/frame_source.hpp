@@ -1,0 +1,38 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/capture/frame.hpp"
+#include "server/capture/target.hpp"
+
+namespace saccade {
+
+/// Facts about a source that are known before its first frame.
+struct SourceInfo {
+  std::string uri;
+  std::shared_ptr<const CameraModel> camera;
+  std::optional<Target> target;     // known points, if the place has them
+  std::optional<StartPose> start;   // nominal first pose
+  std::optional<std::uint64_t> frame_count;
+};
+
+/// Where frames come from. One thread calls Next(); the source paces itself only if it is live or
+/// was opened with `realtime`.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  virtual const SourceInfo& info() const = 0;
+  /// The next frame, or nothing at the end.
+  /// A frame that cannot be decoded is skipped, counted in bad_frames() and named on stderr; an
+  /// error means that the source as a whole is gone.
+  virtual absl::StatusOr<std::optional<Frame>> Next() = 0;
+  virtual std::uint64_t bad_frames() const = 0;
+};
+
+}  // namespace saccade

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "shared/geometry/rigid3.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+namespace saccade {
+
+enum class AnnotationShape { kCube, kNote, kArrow, kInk };
+
+/// Slam-spec section 9; semantics of ARCore's TRACKING / PAUSED / STOPPED.
+enum class AnchorState { kProvisional, kTracking, kPaused, kStopped };
+
+/// Where the expert clicked. Exactly one.
+struct PixelTarget {
+  FrameId frame_id = 0;  // the frame whose picture the expert saw
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw picture, full resolution, distorted [px]
+};
+struct FeatureTarget {
+  FeatureId feature_id = 0;
+};
+struct PointTarget {
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
+};
+struct RayTarget {
+  Eigen::Vector3d origin_in_world = Eigen::Vector3d::Zero();     // [m]
+  Eigen::Vector3d direction_in_world = Eigen::Vector3d::UnitZ();  // any length > 0
+};
+using AnnotationTarget = std::variant<PixelTarget, FeatureTarget, PointTarget, RayTarget>;
+
+/// A request to place something, already validated (finite numbers, known shape).
+struct AnnotationDraft {
+  std::string request_id;  // UUID of the caller; a repeated one answers with the first result
+  AnnotationShape shape = AnnotationShape::kCube;
+  std::string text;
+  std::string author;
+  double size_m = 0.05;
+  std::uint32_t color_rgba = 0xffffffff;
+  AnnotationTarget target;
+  std::vector<Eigen::Vector2d> ink_px;  // kInk: stroke in the target's frame [px]
+};
+
+/// How a click became a point: slam-spec section 9, in order of preference.
+enum class AnchorMethod { kScene, kFeature, kPlane, kMedianDepth, kPoint };
+
+/// The live estimate behind an annotation, recomputed for each frame.
+struct Anchor {
+  AnchorState state = AnchorState::kProvisional;
+  AnchorMethod method = AnchorMethod::kMedianDepth;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();       // [m]
+  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  // [m^2]
+  /// Expected error: 1 sigma, largest axis. px is nothing while out of view.
+  double error_m = 0.0;
+  std::optional<double> error_px;
+  std::string reason;  // why paused or stopped, in words
+};
+
+struct Annotation {
+  std::string id;  // UUID, outlives the session
+  AnnotationShape shape = AnnotationShape::kCube;
+  std::string text;
+  std::string author;
+  double size_m = 0.05;
+  std::uint32_t color_rgba = 0xffffffff;
+  std::int64_t created_unix_ns = 0;
+  std::uint64_t revision = 0;  // rises with each edit
+  Anchor anchor;
+  /// kInk: the stroke relative to the anchor, axes parallel to world [m].
+  std::vector<Eigen::Vector3d> ink_offset_m;
+};
+
+}  // namespace saccade
