@@ -58,7 +58,8 @@ struct Anchor {
   /// Expected error: 1 sigma, largest axis. px is nothing while out of view.
   double error_m = 0.0;
   std::optional<double> error_px;
-  std::string reason;  // why paused or stopped, in words
+  std::optional<Eigen::Vector2d> pixel;  // where it is in the newest frame [px, distorted]
+  std::string reason;                    // why paused or stopped, in words
 };
 
 struct Annotation {
@@ -73,6 +74,22 @@ struct Annotation {
   Anchor anchor;
   /// kInk: the stroke relative to the anchor, axes parallel to world [m].
   std::vector<Eigen::Vector3d> ink_offset_m;
+};
+
+/// A change of an existing annotation; what is not set stays.
+struct AnnotationPatch {
+  std::string id;
+  std::optional<std::string> text;
+  std::optional<double> size_m;
+  std::optional<std::uint32_t> color_rgba;
+  std::optional<AnnotationTarget> target;  // set: move it there
+};
+
+/// An anchor jumped by more than 2 cm (slam-spec section 9).
+struct AnchorMoved {
+  std::string id;
+  Eigen::Vector3d delta_in_world = Eigen::Vector3d::Zero();  // [m]
+  std::string cause;                                         // "map corrected", "moved by its author"
 };
 
 }  // namespace saccade
