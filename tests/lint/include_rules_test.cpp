@@ -50,6 +50,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"shared/wire/a.hpp", "#include \"server/capture/frame.hpp\"", false},
                     Case{"server/filter/a.cpp", "#include \"ekf.hpp\"", false},
                     Case{"server/filter/a.cpp", "#include \"../map/map.hpp\"", false},
+                    Case{"server/filter/a.cpp", "#include <server/map/map.hpp>", false},
+                    Case{"server/filter/a.cpp", "#include \"absl/status/status.h\"", true},
                     Case{"server/filter/a.cpp", "#include \"tests/support/world.hpp\"", false}));
 
 INSTANTIATE_TEST_SUITE_P(
