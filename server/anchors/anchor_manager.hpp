@@ -1,0 +1,111 @@
+#pragma once
+
+#include <absl/container/flat_hash_map.h>
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/anchors/anchor_options.hpp"
+#include "server/anchors/anchor_record.hpp"
+#include "server/anchors/edit_history.hpp"
+#include "server/anchors/frame_ring.hpp"
+#include "server/anchors/stored_annotation.hpp"
+#include "shared/scene/annotation.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+namespace saccade {
+
+/// Asks the tracker to start a feature at a clicked pixel of a past frame; its depth takes over
+/// from the neighbours' guess. Same thread. An error (no texture there, map full) costs only
+/// accuracy.
+using SeedFeatureFunction = std::function<absl::StatusOr<FeatureId>(
+    const Frame& clicked_frame, const Rigid3& world_from_camera, const Eigen::Vector2d& pixel,
+    double depth_prior_m, double depth_sigma_m)>;
+
+/// An edit that holds in memory and has to be made durable: hand `change` to the store, answer with
+/// `annotation` after its commit, and call RollBack if it fails.
+struct AnnotationEdit {
+  Annotation annotation;  // after the edit; state STOPPED if it was deleted
+  AnnotationChange change;
+};
+
+/// Annotations bound to the map: the one owner, on the tracker thread. Readers take Latest().
+///
+/// Edits change memory at once and are kept revocable until Committed(sequence).
+class AnchorManager {
+ public:
+  AnchorManager(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed);
+
+  /// Takes over what the store holds, before the first Resolve. All of it is paused until its place
+  /// in the map is known.
+  void Load(std::vector<StoredAnnotation> stored);
+
+  /// Places something. The target is resolved with the pose of the frame it names, carried into the
+  /// newest map. Errors:
+  ///   InvalidArgument     not finite, pixel outside the image, size or text out of range
+  ///   NotFound            frame too old or unknown; unknown feature
+  ///   FailedPrecondition  not tracking in that frame; map was reset since; no depth known yet
+  ///   ResourceExhausted   options.max_annotations reached
+  absl::StatusOr<AnnotationEdit> Create(const AnnotationDraft& draft,
+                                        const std::string& session_id);
+  /// As Create; NotFound for an unknown id.
+  absl::StatusOr<AnnotationEdit> Update(const AnnotationPatch& patch,
+                                        const std::string& session_id);
+  absl::StatusOr<AnnotationEdit> Delete(const std::string& id, const std::string& session_id);
+
+  /// Takes back, or does again, the last change made by this session. FailedPrecondition if there
+  /// is none, or if somebody else changed that annotation since (that step is then dropped).
+  absl::StatusOr<AnnotationEdit> Undo(const std::string& session_id);
+  absl::StatusOr<AnnotationEdit> Redo(const std::string& session_id);
+
+  /// Once per frame: recomputes every anchor from the newest map and publishes. Returns the jumps.
+  std::vector<AnchorMoved> Resolve(std::shared_ptr<const MapSnapshot> snapshot,
+                                   const CameraModel& camera);
+
+  /// Anchors whose estimate became worth storing again (moved by more than a centimetre or became
+  /// twice as sure since last stored); at most one in two seconds each. Not part of any undo.
+  std::vector<AnnotationChange> TakeRefinements();
+
+  /// Everything up to `sequence` is on disk.
+  void Committed(std::uint64_t sequence);
+  /// Takes back every change after the last Committed one, newest first.
+  void RollBack();
+
+  /// All annotations as of the last Resolve or edit, oldest first; never null. Any thread.
+  std::shared_ptr<const std::vector<Annotation>> Latest() const;
+
+ private:
+  absl::StatusOr<AnnotationEdit> Apply(EditKind kind, const std::string& session_id, EditStep step,
+                                       EditHistory history_after);
+  absl::StatusOr<AnnotationEdit> TakeBack(bool undo, const std::string& session_id);
+  absl::Status Place(const AnnotationTarget& target, const std::vector<Eigen::Vector2d>& ink_px,
+                     AnchorRecord& record);
+  void Put(const std::string& id, const RecordPtr& record);
+  AnchorRecord* Find(const std::string& id);
+  void Estimate(const CameraModel& camera, AnchorRecord& record);
+  void Publish();
+
+  AnchorOptions options_;
+  FrameLookup frames_;
+  SeedFeatureFunction seed_;
+  std::shared_ptr<const MapView> newest_;  // null before the first Resolve
+  std::optional<CameraModel> camera_;
+  std::vector<AnchorRecord> records_;                        // oldest first
+  absl::flat_hash_map<std::string, EditHistory> histories_;  // by session
+  std::deque<PendingEdit> pending_;
+  std::uint64_t next_sequence_ = 1;
+  std::uint64_t next_content_ = 1;
+
+  mutable std::mutex latest_mutex_;
+  std::shared_ptr<const std::vector<Annotation>> latest_;
+};
+
+}  // namespace saccade

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <cstddef>
+#include <string>
+
+#include "server/capture/target.hpp"
+
+namespace saccade {
+
+/// Settings of the anchors (slam-spec section 9), defaults from there unless said otherwise.
+struct AnchorOptions {
+  int cluster_size = 6;                   // features that carry an anchor
+  double cluster_softening_m = 0.1;       // in 1 / (sigma^2 (dist^2 + softening^2))
+  double feature_radius_px = 20.0;        // a click this near to a feature may take its depth
+  double plane_residual_m = 0.02;         // of a plane through neighbours, metric maps
+  double plane_residual_relative = 0.01;  // the same, as a share of depth (any map)
+  double median_depth_sigma = 0.3;        // share of depth
+  double click_sigma_px = 0.7;            // how well a person hits a pixel
+  double tracking_sigma = 0.1;            // provisional until sigma / depth is below
+  double pause_sigma_m = 0.05;            // "do not trust" above...
+  double pause_sigma_relative = 0.02;     // ...unless below this share of the distance
+  double pause_sigma_px = 10.0;
+  double resume_share = 0.8;   // a paused anchor resumes below this share of the limit
+  double moved_m = 0.02;       // a jump above this is reported
+  double refine_time_s = 0.5;  // a better depth is taken over this slowly: nothing jumps
+  std::size_t max_annotations = 1000;
+  std::size_t max_undo = 100;  // per session
+  /// What makes world the same world after a restart: WorldKey(target). Empty: nothing does, and
+  /// stored annotations stay paused.
+  std::string world_key;
+
+  absl::Status Validate() const;
+};
+
+/// A text that is equal for equal targets, e.g. "chessboard 9x6 0.04 m". Stored with annotations: a
+/// metric map started from the same target has the same world frame.
+std::string WorldKey(const Target& target);
+
+}  // namespace saccade

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <absl/container/flat_hash_map.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/anchors/anchor_options.hpp"
+#include "shared/geometry/rigid3.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+namespace saccade {
+
+/// A snapshot whose features are found by id in constant time; made once per frame.
+class MapView {
+ public:
+  explicit MapView(std::shared_ptr<const MapSnapshot> snapshot);
+  const MapSnapshot& snapshot() const { return *snapshot_; }
+  /// Null if the map does not hold it (any more).
+  const FeatureSnapshot* Find(FeatureId id) const;
+
+ private:
+  std::shared_ptr<const MapSnapshot> snapshot_;
+  absl::flat_hash_map<FeatureId, const FeatureSnapshot*> by_id_;
+};
+
+/// One of the features that carry an anchor.
+struct ClusterMember {
+  FeatureId id = 0;
+  double weight = 1.0;                                      // 1 / (sigma^2 (dist^2 + softening^2))
+  Eigen::Vector3d at_binding = Eigen::Vector3d::Zero();     // in binding [m]
+  Eigen::Vector3d last_in_world = Eigen::Vector3d::Zero();  // in the frame before [m]
+};
+
+/// How an anchor hangs in the map. `binding` is the world frame as the map had it when the anchor
+/// was placed; `world_from_binding`, a weighted rigid fit of the members, carries it to now.
+struct AnchorPlace {
+  std::uint64_t id = 0;  // new with each placing; equal: the same place, edited otherwise
+  std::uint64_t map_generation = 0;
+  bool attached = false;       // false: known only by its point, if at all (restart, reset)
+  bool known_in_world = true;  // the point means something in this generation's world frame
+  std::string world_key;       // of the world the point was placed in
+  AnchorMethod method = AnchorMethod::kPoint;
+  std::vector<ClusterMember> members;
+
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // drawn, in binding [m]
+  /// What the click alone said, in binding, and how sure, relative to the members [m^2].
+  Eigen::Vector3d clicked_point = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d clicked_covariance = Eigen::Matrix3d::Zero();
+  double distance_m = 1.0;        // from the camera when it was placed: scale of what is near
+  std::optional<FeatureId> seed;  // feature at the very pixel; refines the point as it converges
+  bool seed_is_target = false;    // the feature itself was chosen
+
+  Rigid3 world_from_binding;
+  bool was_tracking = false;  // has been sure once: now TRACKING or PAUSED, not PROVISIONAL
+  bool paused = false;        // by its own error (hysteresis)
+  Timestamp last_time_ns = 0;
+};
+
+/// Estimate of one anchor in one frame.
+struct PlaceEstimate {
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
+  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // [m^2]
+  Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // camera pose included [m^2]
+};
+
+/// Hangs `place`, whose point is given in world, on the nearest features with known depth. Without
+/// any it stays where it is in world.
+void Bind(const MapView& map, const AnchorOptions& options, AnchorPlace& place);
+
+/// Carries `place` to this frame: replaces members that the map dropped without moving the point,
+/// fits the members' motion, and takes over the seeded feature's better depth gradually.
+PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place);
+
+}  // namespace saccade

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <absl/container/flat_hash_map.h>
+#include <absl/status/statusor.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/anchors/anchor_manager.hpp"
+#include "server/store/annotation_store.hpp"
+
+namespace saccade {
+
+/// The annotations as RPCs see them: AnchorManager with AnnotationStore behind it. Every call but
+/// Latest() on the tracker thread. An answer is given after commit, once, on the store's thread (or
+/// at once on the caller's, for a refusal); it must not call back into the book.
+class AnnotationBook {
+ public:
+  using AnnotationDone = std::function<void(const absl::StatusOr<Annotation>&)>;
+  using DescriptionDone = std::function<void(const absl::StatusOr<std::string>&)>;
+
+  /// Loads what is on disk. `store` may be null: nothing is kept (offline evaluation), answers come
+  /// at once.
+  static absl::StatusOr<std::unique_ptr<AnnotationBook>> Open(
+      AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
+      std::unique_ptr<AnnotationStore> store);
+
+  /// A draft whose request id was answered before is answered with that annotation again.
+  void Create(const AnnotationDraft& draft, const std::string& session_id, AnnotationDone done);
+  void Update(const AnnotationPatch& patch, const std::string& session_id, AnnotationDone done);
+  void Delete(const std::string& id, const std::string& session_id, AnnotationDone done);
+  /// The description says what was done, e.g. "deleted cube 6f1c...".
+  void Undo(const std::string& session_id, DescriptionDone done);
+  void Redo(const std::string& session_id, DescriptionDone done);
+
+  /// Once per frame, after the tracker: settles commits, recomputes anchors, publishes. Returns the
+  /// jumps.
+  std::vector<AnchorMoved> OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
+                                      const CameraModel& camera);
+
+  /// All annotations, oldest first; never null. Any thread.
+  std::shared_ptr<const std::vector<Annotation>> Latest() const { return anchors_.Latest(); }
+
+ private:
+  AnnotationBook(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
+                 std::unique_ptr<AnnotationStore> store);
+  /// Follows the store: forgets what is on disk; after a failed commit takes memory back.
+  void Settle();
+  void Commit(AnnotationEdit edit, AnnotationDone done);
+
+  AnchorManager anchors_;
+  std::unique_ptr<AnnotationStore> store_;
+  absl::flat_hash_map<std::string, std::string> requests_;  // request id to annotation id
+};
+
+}  // namespace saccade
