@@ -1,0 +1,59 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <variant>
+
+#include "shared/scene/annotation.hpp"
+
+namespace saccade {
+
+/// Answer to a command. Called exactly once, on any thread; must not block.
+template <typename Result>
+using Done = std::function<void(absl::StatusOr<Result>)>;
+using DoneEmpty = std::function<void(absl::Status)>;
+
+// What may be asked of the tracker thread. `owner` is the session, whose own changes Undo takes
+// back.
+struct CreateAnnotation {
+  std::string owner;
+  AnnotationDraft draft;
+  Done<Annotation> done;  // after the commit
+};
+struct UpdateAnnotation {
+  std::string owner;
+  AnnotationPatch patch;
+  Done<Annotation> done;
+};
+struct DeleteAnnotation {
+  std::string owner;
+  std::string id;
+  DoneEmpty done;
+};
+struct UndoChange {
+  std::string owner;
+  bool redo = false;
+  Done<std::string> done;  // what was undone, in words
+};
+struct ResetMap {
+  Done<std::uint64_t> done;  // the new map_generation
+};
+
+using Command =
+    std::variant<CreateAnnotation, UpdateAnnotation, DeleteAnnotation, UndoChange, ResetMap>;
+
+/// Answers a command that will not be carried out.
+void Fail(const Command& command, const absl::Status& status);
+
+/// Where commands go: the tracker thread's bounded mailbox, on this machine or another.
+class CommandPort {
+ public:
+  virtual ~CommandPort() = default;
+  /// Never blocks. On error (ResourceExhausted, Unavailable) `done` is not called.
+  virtual absl::Status Submit(Command command) = 0;
+};
+
+}  // namespace saccade

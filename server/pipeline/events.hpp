@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "shared/camera/camera_model.hpp"
+#include "shared/scene/annotation.hpp"
+#include "shared/scene/map_snapshot.hpp"
+#include "shared/time/timestamp.hpp"
+
+namespace saccade {
+
+using AnnotationList = std::vector<Annotation>;
+
+/// When each stage of one frame ended, MonotonicNow() clock [ns]; 0: not run.
+struct StageTimestamps {
+  Timestamp captured_ns = 0;  // exposure middle, brought to the monotonic clock
+  Timestamp received_ns = 0;  // picture complete in memory
+  Timestamp tracked_ns = 0;   // pose published
+  Timestamp encoded_ns = 0;   // access unit complete
+};
+
+/// What is known after one frame. Immutable; parts are shared.
+struct TrackedEvent {
+  std::shared_ptr<const MapSnapshot> snapshot;        // never null
+  std::shared_ptr<const AnnotationList> annotations;  // never null
+  std::shared_ptr<const CameraModel> camera;          // never null
+  StageTimestamps stages;
+};
+
+enum class VideoView { kRaw, kAugmented };
+inline constexpr int kVideoViews = 2;
+
+/// One coded picture with the pose it was taken from.
+struct VideoPacket {
+  VideoView view = VideoView::kRaw;
+  bool key_frame = false;
+  int temporal_layer = 0;                   // 0, 1, 2
+  std::shared_ptr<const std::string> data;  // one access unit, H.264 Annex B
+  int width = 0, height = 0;                // of the picture as coded [px]
+  TrackedEvent tracked;                     // of the same frame
+};
+
+/// Rates and times of the last seconds.
+struct EngineStatistics {
+  double captured_fps = 0, tracked_fps = 0, encoded_fps = 0;  // [Hz]
+  std::uint64_t frames_dropped = 0;  // not tracked because a newer one was there
+  std::uint64_t bad_frames = 0;      // could not be decoded
+  double video_bit_rate_bit_s = 0;
+  double track_ms_p50 = 0, track_ms_p95 = 0, encode_ms_p50 = 0, encode_ms_p95 = 0;
+};
+
+/// Who hears of what happens: the gRPC streams here, a message broker on another machine later.
+/// Calls come from the tracker and encode threads and must not block.
+class EventSink {
+ public:
+  virtual ~EventSink() = default;
+  virtual void OnTracked(const TrackedEvent& event) = 0;
+  virtual void OnVideo(const std::shared_ptr<const VideoPacket>& packet) = 0;
+  virtual void OnStatistics(const EngineStatistics& statistics) = 0;
+  virtual void OnEndOfSource(std::uint64_t frames) = 0;
+};
+
+}  // namespace saccade

@@ -1,0 +1,186 @@
+#include "shared/wire/from_proto.hpp"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+
+namespace saccade::wire {
+namespace {
+
+absl::Status Bad(absl::string_view field, absl::string_view problem) {
+  return absl::InvalidArgumentError(absl::StrCat(field, ": ", problem));
+}
+
+absl::Status CheckFinite(double value, absl::string_view field, absl::string_view part) {
+  if (std::isfinite(value)) return absl::OkStatus();
+  return Bad(absl::StrCat(field, ".", part), "must be a finite number");
+}
+
+absl::StatusOr<Eigen::Vector2d> PixelFromProto(const v1::Pixel& message, const ImageSize& image,
+                                               absl::string_view field) {
+  const Eigen::Vector2d pixel(message.u(), message.v());
+  const int size[2] = {image.width, image.height};
+  const char* const part[2] = {"u", "v"};
+  for (int i = 0; i < 2; ++i) {
+    if (absl::Status s = CheckFinite(pixel[i], field, part[i]); !s.ok()) return s;
+    // Half a pixel beyond the centres of the outermost pixels is still the picture.
+    if (pixel[i] < -0.5 || pixel[i] > size[i] - 0.5) {
+      return Bad(absl::StrCat(field, ".", part[i]),
+                 absl::StrCat(pixel[i], " is outside the picture (-0.5 to ", size[i] - 0.5, ")"));
+    }
+  }
+  return pixel;
+}
+
+absl::StatusOr<AnnotationShape> ShapeFromProto(v1::AnnotationShape shape, absl::string_view field) {
+  switch (shape) {
+    case v1::ANNOTATION_SHAPE_CUBE:
+      return AnnotationShape::kCube;
+    case v1::ANNOTATION_SHAPE_NOTE:
+      return AnnotationShape::kNote;
+    case v1::ANNOTATION_SHAPE_ARROW:
+      return AnnotationShape::kArrow;
+    case v1::ANNOTATION_SHAPE_INK:
+      return AnnotationShape::kInk;
+    default:
+      return Bad(field, absl::StrCat("unknown shape ", static_cast<int>(shape),
+                                     ": use CUBE, NOTE, ARROW or INK"));
+  }
+}
+
+absl::StatusOr<AnnotationTarget> PixelTargetFromProto(const v1::FramePixel& message,
+                                                      const ImageSize& image,
+                                                      absl::string_view field) {
+  if (!message.has_pixel()) return Bad(absl::StrCat(field, ".pixel"), "is missing");
+  absl::StatusOr<Eigen::Vector2d> pixel =
+      PixelFromProto(message.pixel(), image, absl::StrCat(field, ".pixel"));
+  if (!pixel.ok()) return pixel.status();
+  return PixelTarget{message.frame_id(), *pixel};
+}
+
+absl::StatusOr<AnnotationTarget> RayFromProto(const v1::Ray& message, absl::string_view field) {
+  absl::StatusOr<Eigen::Vector3d> origin =
+      FromProto(message.origin_in_world_m(), absl::StrCat(field, ".origin_in_world_m"));
+  if (!origin.ok()) return origin.status();
+  const std::string direction_field = absl::StrCat(field, ".direction_in_world");
+  absl::StatusOr<Eigen::Vector3d> direction =
+      FromProto(message.direction_in_world(), direction_field);
+  if (!direction.ok()) return direction.status();
+  if (direction->norm() < 1e-9) return Bad(direction_field, "must be longer than 0");
+  return RayTarget{*origin, *direction};
+}
+
+absl::Status CheckInk(const v1::AnnotationDraft& message, absl::string_view field) {
+  const std::string ink = absl::StrCat(field, ".ink_px");
+  if (message.shape() != v1::ANNOTATION_SHAPE_INK) {
+    return message.ink_px().empty() ? absl::OkStatus() : Bad(ink, "only an INK shape has a stroke");
+  }
+  if (message.ink_px_size() < 2) return Bad(ink, "a stroke has at least 2 points");
+  if (message.ink_px_size() > kMaxInkPoints) {
+    return Bad(ink,
+               absl::StrCat("at most ", kMaxInkPoints, " points, not ", message.ink_px_size()));
+  }
+  if (!message.target().has_frame_pixel()) {
+    return Bad(absl::StrCat(field, ".target"), "an INK shape needs a frame_pixel");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<Eigen::Vector3d> FromProto(const v1::Vector3& message, absl::string_view field) {
+  const Eigen::Vector3d value(message.x(), message.y(), message.z());
+  const char* const part[3] = {"x", "y", "z"};
+  for (int i = 0; i < 3; ++i) {
+    if (absl::Status s = CheckFinite(value[i], field, part[i]); !s.ok()) return s;
+    if (std::abs(value[i]) > kMaxCoordinateM) {
+      return Bad(absl::StrCat(field, ".", part[i]),
+                 absl::StrCat(value[i], " is beyond ", kMaxCoordinateM));
+    }
+  }
+  return value;
+}
+
+absl::StatusOr<AnnotationTarget> FromProto(const v1::AnnotationTarget& message,
+                                           const ImageSize& image, absl::string_view field) {
+  switch (message.target_case()) {
+    case v1::AnnotationTarget::kFramePixel:
+      return PixelTargetFromProto(message.frame_pixel(), image,
+                                  absl::StrCat(field, ".frame_pixel"));
+    case v1::AnnotationTarget::kFeatureId:
+      return FeatureTarget{message.feature_id()};
+    case v1::AnnotationTarget::kPointInWorldM: {
+      absl::StatusOr<Eigen::Vector3d> point =
+          FromProto(message.point_in_world_m(), absl::StrCat(field, ".point_in_world_m"));
+      if (!point.ok()) return point.status();
+      return PointTarget{*point};
+    }
+    case v1::AnnotationTarget::kRay:
+      return RayFromProto(message.ray(), absl::StrCat(field, ".ray"));
+    case v1::AnnotationTarget::TARGET_NOT_SET:
+      break;
+  }
+  return Bad(field, "is missing: give frame_pixel, feature_id, point_in_world_m or ray");
+}
+
+absl::StatusOr<AnnotationDraft> FromProto(const v1::AnnotationDraft& message,
+                                          const ImageSize& image, absl::string_view field) {
+  AnnotationDraft draft;
+  absl::StatusOr<AnnotationShape> shape =
+      ShapeFromProto(message.shape(), absl::StrCat(field, ".shape"));
+  if (!shape.ok()) return shape.status();
+  draft.shape = *shape;
+  absl::Status text = CheckText(message.text(), kMaxTextBytes, absl::StrCat(field, ".text"));
+  if (!text.ok()) return text;
+  draft.text = message.text();
+  absl::StatusOr<double> size = CheckSize(message.size_m(), absl::StrCat(field, ".size_m"));
+  if (!size.ok()) return size.status();
+  draft.size_m = *size;
+  if (message.color_rgba() != 0) draft.color_rgba = message.color_rgba();
+  absl::StatusOr<AnnotationTarget> target =
+      FromProto(message.target(), image, absl::StrCat(field, ".target"));
+  if (!target.ok()) return target.status();
+  draft.target = *target;
+  if (absl::Status ink = CheckInk(message, field); !ink.ok()) return ink;
+  for (int i = 0; i < message.ink_px_size(); ++i) {
+    absl::StatusOr<Eigen::Vector2d> pixel =
+        PixelFromProto(message.ink_px(i), image, absl::StrCat(field, ".ink_px[", i, "]"));
+    if (!pixel.ok()) return pixel.status();
+    draft.ink_px.push_back(*pixel);
+  }
+  return draft;
+}
+
+absl::StatusOr<double> CheckSize(double size_m, absl::string_view field) {
+  if (!std::isfinite(size_m)) return Bad(field, "must be a finite number");
+  if (size_m == 0.0) return kDefaultSizeM;
+  if (size_m < kMinSizeM || size_m > kMaxSizeM) {
+    return Bad(field, absl::StrCat(size_m, " is not between ", kMinSizeM, " and ", kMaxSizeM));
+  }
+  return size_m;
+}
+
+absl::Status CheckText(absl::string_view text, std::size_t max_bytes, absl::string_view field) {
+  if (text.size() > max_bytes) {
+    return Bad(field, absl::StrCat("at most ", max_bytes, " bytes, not ", text.size()));
+  }
+  for (const char c : text) {
+    if (absl::ascii_iscntrl(static_cast<unsigned char>(c)) && c != '\n') {
+      return Bad(field, "holds a control character");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckUuid(absl::string_view id, absl::string_view field) {
+  bool good = id.size() == 36;
+  for (std::size_t i = 0; good && i < id.size(); ++i) {
+    const bool dash = i == 8 || i == 13 || i == 18 || i == 23;
+    good = dash ? id[i] == '-' : absl::ascii_isxdigit(static_cast<unsigned char>(id[i]));
+  }
+  return good ? absl::OkStatus()
+              : Bad(field, "must be a UUID such as 6f1c2c9e-3d43-4d0a-9f5e-0c9b1a7f2d11");
+}
+
+}  // namespace saccade::wire

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "saccade/v1/session.pb.h"
+#include "shared/camera/camera_model.hpp"
+#include "shared/geometry/rigid3.hpp"
+#include "shared/scene/annotation.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+/// Messages to domain structs. Whatever arrives is checked here and nowhere else: finite numbers,
+/// pixels inside the picture, sizes, lengths, known enums. Every error is InvalidArgument and
+/// starts with the path of the field: "draft.target.frame_pixel.pixel.u: ...". Pure functions, any
+/// thread.
+namespace saccade::wire {
+
+/// Bounds that depend on the camera; the rest are constants.
+struct ImageSize {
+  int width = 0, height = 0;  // [px]
+};
+
+inline constexpr double kMaxSizeM = 10.0;
+inline constexpr double kMinSizeM = 1e-3;
+inline constexpr double kDefaultSizeM = 0.05;
+inline constexpr double kMaxCoordinateM = 1e4;
+inline constexpr std::size_t kMaxTextBytes = 500;
+inline constexpr std::size_t kMaxNameBytes = 60;
+inline constexpr int kMaxInkPoints = 2000;
+
+absl::StatusOr<Eigen::Vector3d> FromProto(const v1::Vector3& message, absl::string_view field);
+absl::StatusOr<Rigid3> FromProto(const v1::Rigid3& message, absl::string_view field);
+absl::StatusOr<Eigen::Matrix3d> FromProto(const v1::Covariance3& message, absl::string_view field);
+absl::StatusOr<Matrix6d> FromProto(const v1::Covariance6& message, absl::string_view field);
+absl::StatusOr<CameraIntrinsics> FromProto(const v1::CameraIntrinsics& message,
+                                           absl::string_view field);
+
+absl::StatusOr<AnnotationTarget> FromProto(const v1::AnnotationTarget& message,
+                                           const ImageSize& image, absl::string_view field);
+/// The draft's defaults filled in; request_id and author are the caller's to set.
+absl::StatusOr<AnnotationDraft> FromProto(const v1::AnnotationDraft& message,
+                                          const ImageSize& image,
+                                          absl::string_view field = "draft");
+
+/// 0 becomes kDefaultSizeM.
+absl::StatusOr<double> CheckSize(double size_m, absl::string_view field);
+/// At most `max_bytes` of UTF-8 without control characters other than line feed.
+absl::Status CheckText(absl::string_view text, std::size_t max_bytes, absl::string_view field);
+/// 8-4-4-4-12 hexadecimal digits.
+absl::Status CheckUuid(absl::string_view id, absl::string_view field);
+
+// What a client reads from the server.
+absl::StatusOr<MapSnapshot> FromProto(const v1::PoseEvent& message, absl::string_view field);
+absl::StatusOr<FeatureSnapshot> FromProto(const v1::Feature& message, absl::string_view field);
+absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string_view field);
+
+}  // namespace saccade::wire

@@ -1,0 +1,266 @@
+#include "shared/wire/to_proto.hpp"
+
+namespace saccade::wire {
+namespace {
+
+template <int N, typename Message>
+Message UpperTriangle(const Eigen::Matrix<double, N, N>& matrix) {
+  Message message;
+  message.mutable_upper()->Reserve(N * (N + 1) / 2);
+  for (int row = 0; row < N; ++row) {
+    for (int column = row; column < N; ++column) message.add_upper(matrix(row, column));
+  }
+  return message;
+}
+
+v1::AnchorState ToProto(AnchorState state) {
+  switch (state) {
+    case AnchorState::kProvisional:
+      return v1::ANCHOR_STATE_PROVISIONAL;
+    case AnchorState::kTracking:
+      return v1::ANCHOR_STATE_TRACKING;
+    case AnchorState::kPaused:
+      return v1::ANCHOR_STATE_PAUSED;
+    case AnchorState::kStopped:
+      return v1::ANCHOR_STATE_STOPPED;
+  }
+  return v1::ANCHOR_STATE_UNSPECIFIED;
+}
+
+v1::AnchorMethod ToProto(AnchorMethod method) {
+  switch (method) {
+    case AnchorMethod::kScene:
+      return v1::ANCHOR_METHOD_SCENE;
+    case AnchorMethod::kFeature:
+      return v1::ANCHOR_METHOD_FEATURE;
+    case AnchorMethod::kPlane:
+      return v1::ANCHOR_METHOD_PLANE;
+    case AnchorMethod::kMedianDepth:
+      return v1::ANCHOR_METHOD_MEDIAN_DEPTH;
+    case AnchorMethod::kPoint:
+      return v1::ANCHOR_METHOD_POINT;
+  }
+  return v1::ANCHOR_METHOD_UNSPECIFIED;
+}
+
+v1::FeatureState ToProto(FeatureState state) {
+  switch (state) {
+    case FeatureState::kNotAttempted:
+      return v1::FEATURE_STATE_NOT_ATTEMPTED;
+    case FeatureState::kMeasured:
+      return v1::FEATURE_STATE_MEASURED;
+    case FeatureState::kFailed:
+      return v1::FEATURE_STATE_FAILED;
+  }
+  return v1::FEATURE_STATE_UNSPECIFIED;
+}
+
+v1::CameraIntrinsics::Model ToProto(LensModel model) {
+  switch (model) {
+    case LensModel::kPinhole:
+      return v1::CameraIntrinsics::MODEL_PINHOLE;
+    case LensModel::kRadial1:
+      return v1::CameraIntrinsics::MODEL_RADIAL1;
+    case LensModel::kBrownConrady:
+      return v1::CameraIntrinsics::MODEL_BROWN_CONRADY;
+    case LensModel::kKannalaBrandt:
+      return v1::CameraIntrinsics::MODEL_KANNALA_BRANDT;
+  }
+  return v1::CameraIntrinsics::MODEL_UNSPECIFIED;
+}
+
+int DistortionSize(LensModel model) {
+  switch (model) {
+    case LensModel::kPinhole:
+      return 0;
+    case LensModel::kRadial1:
+      return 1;
+    case LensModel::kBrownConrady:
+      return 5;
+    case LensModel::kKannalaBrandt:
+      return 4;
+  }
+  return 0;
+}
+
+}  // namespace
+
+v1::Vector3 ToProto(const Eigen::Vector3d& value) {
+  v1::Vector3 message;
+  message.set_x(value.x());
+  message.set_y(value.y());
+  message.set_z(value.z());
+  return message;
+}
+
+v1::Pixel ToProto(const Eigen::Vector2d& pixel) {
+  v1::Pixel message;
+  message.set_u(pixel.x());
+  message.set_v(pixel.y());
+  return message;
+}
+
+v1::Quaternion ToProto(const Eigen::Quaterniond& rotation) {
+  v1::Quaternion message;
+  message.set_x(rotation.x());
+  message.set_y(rotation.y());
+  message.set_z(rotation.z());
+  message.set_w(rotation.w());
+  return message;
+}
+
+v1::Rigid3 ToProto(const Rigid3& target_from_source) {
+  v1::Rigid3 message;
+  *message.mutable_translation_m() = ToProto(target_from_source.translation);
+  *message.mutable_rotation() = ToProto(target_from_source.rotation);
+  return message;
+}
+
+v1::Covariance3 ToProto(const Eigen::Matrix3d& covariance) {
+  return UpperTriangle<3, v1::Covariance3>(covariance);
+}
+
+v1::Covariance6 ToProto(const Matrix6d& covariance) {
+  return UpperTriangle<6, v1::Covariance6>(covariance);
+}
+
+v1::CameraIntrinsics ToProto(const CameraIntrinsics& intrinsics) {
+  v1::CameraIntrinsics message;
+  message.set_model(ToProto(intrinsics.model));
+  message.set_width_px(static_cast<std::uint32_t>(intrinsics.width));
+  message.set_height_px(static_cast<std::uint32_t>(intrinsics.height));
+  message.set_fx_px(intrinsics.fx);
+  message.set_fy_px(intrinsics.fy);
+  message.set_cx_px(intrinsics.cx);
+  message.set_cy_px(intrinsics.cy);
+  for (int i = 0; i < DistortionSize(intrinsics.model); ++i) {
+    message.add_distortion(intrinsics.distortion[static_cast<std::size_t>(i)]);
+  }
+  return message;
+}
+
+v1::TrackingStatus ToProto(TrackingStatus status) {
+  switch (status) {
+    case TrackingStatus::kInitialising:
+      return v1::TRACKING_STATUS_INITIALISING;
+    case TrackingStatus::kTracking:
+      return v1::TRACKING_STATUS_TRACKING;
+    case TrackingStatus::kCoasting:
+      return v1::TRACKING_STATUS_COASTING;
+    case TrackingStatus::kLost:
+      return v1::TRACKING_STATUS_LOST;
+    case TrackingStatus::kRelocalising:
+      return v1::TRACKING_STATUS_RELOCALISING;
+  }
+  return v1::TRACKING_STATUS_UNSPECIFIED;
+}
+
+v1::TrackingQuality ToProto(TrackingQuality quality) {
+  switch (quality) {
+    case TrackingQuality::kUnknown:
+      return v1::TRACKING_QUALITY_UNSPECIFIED;
+    case TrackingQuality::kBad:
+      return v1::TRACKING_QUALITY_BAD;
+    case TrackingQuality::kPoor:
+      return v1::TRACKING_QUALITY_POOR;
+    case TrackingQuality::kGood:
+      return v1::TRACKING_QUALITY_GOOD;
+  }
+  return v1::TRACKING_QUALITY_UNSPECIFIED;
+}
+
+v1::Feature ToProto(const FeatureSnapshot& feature) {
+  v1::Feature message;
+  message.set_id(feature.id);
+  message.set_state(ToProto(feature.state));
+  *message.mutable_point_in_world_m() = ToProto(feature.point_in_world);
+  *message.mutable_covariance_in_world_m2() = ToProto(feature.covariance_in_world);
+  message.set_depth_known(feature.depth_known);
+  if (feature.pixel) *message.mutable_pixel() = ToProto(*feature.pixel);
+  message.set_matched_count(feature.matched_count);
+  return message;
+}
+
+v1::AnnotationShape ToProto(AnnotationShape shape) {
+  switch (shape) {
+    case AnnotationShape::kCube:
+      return v1::ANNOTATION_SHAPE_CUBE;
+    case AnnotationShape::kNote:
+      return v1::ANNOTATION_SHAPE_NOTE;
+    case AnnotationShape::kArrow:
+      return v1::ANNOTATION_SHAPE_ARROW;
+    case AnnotationShape::kInk:
+      return v1::ANNOTATION_SHAPE_INK;
+  }
+  return v1::ANNOTATION_SHAPE_UNSPECIFIED;
+}
+
+v1::PoseEvent ToProtoPose(const MapSnapshot& snapshot, Timestamp captured_ns) {
+  v1::PoseEvent message;
+  message.set_frame_id(snapshot.frame_id);
+  message.set_capture_time_ns(captured_ns);
+  message.set_status(ToProto(snapshot.status));
+  message.set_quality(ToProto(snapshot.quality));
+  message.set_advice(snapshot.advice);
+  message.set_metric(snapshot.metric);
+  *message.mutable_world_from_camera() = ToProto(snapshot.world_from_camera);
+  *message.mutable_covariance() = ToProto(snapshot.pose_covariance);
+  *message.mutable_velocity_in_world_m_s() = ToProto(snapshot.velocity_in_world);
+  *message.mutable_angular_velocity_in_camera_rad_s() =
+      ToProto(snapshot.angular_velocity_in_camera);
+  message.set_features_attempted(static_cast<std::uint32_t>(snapshot.attempted));
+  message.set_features_matched(static_cast<std::uint32_t>(snapshot.matched));
+  message.set_map_revision(snapshot.map_revision);
+  return message;
+}
+
+v1::Annotation ToProto(const Annotation& annotation, const std::optional<Eigen::Vector2d>& pixel) {
+  v1::Annotation message;
+  message.set_id(annotation.id);
+  message.set_shape(ToProto(annotation.shape));
+  message.set_text(annotation.text);
+  message.set_author(annotation.author);
+  message.set_size_m(annotation.size_m);
+  message.set_color_rgba(annotation.color_rgba);
+  message.set_created_unix_ns(annotation.created_unix_ns);
+  message.set_revision(annotation.revision);
+  v1::Anchor& anchor = *message.mutable_anchor();
+  anchor.set_state(ToProto(annotation.anchor.state));
+  anchor.set_method(ToProto(annotation.anchor.method));
+  *anchor.mutable_point_in_world_m() = ToProto(annotation.anchor.point_in_world);
+  *anchor.mutable_covariance_in_world_m2() = ToProto(annotation.anchor.covariance_in_world);
+  anchor.set_error_mm(annotation.anchor.error_m * 1e3);
+  if (annotation.anchor.error_px) anchor.set_error_px(*annotation.anchor.error_px);
+  anchor.set_reason(annotation.anchor.reason);
+  if (pixel) *anchor.mutable_pixel() = ToProto(*pixel);
+  for (const Eigen::Vector3d& offset : annotation.ink_offset_m) {
+    *message.add_ink_offset_m() = ToProto(offset);
+  }
+  return message;
+}
+
+v1::AnnotationTarget ToProto(const AnnotationTarget& target) {
+  v1::AnnotationTarget message;
+  if (const auto* pixel = std::get_if<PixelTarget>(&target)) {
+    message.mutable_frame_pixel()->set_frame_id(pixel->frame_id);
+    *message.mutable_frame_pixel()->mutable_pixel() = ToProto(pixel->pixel);
+  } else if (const auto* feature = std::get_if<FeatureTarget>(&target)) {
+    message.set_feature_id(feature->feature_id);
+  } else if (const auto* point = std::get_if<PointTarget>(&target)) {
+    *message.mutable_point_in_world_m() = ToProto(point->point_in_world);
+  } else if (const auto* ray = std::get_if<RayTarget>(&target)) {
+    *message.mutable_ray()->mutable_origin_in_world_m() = ToProto(ray->origin_in_world);
+    *message.mutable_ray()->mutable_direction_in_world() = ToProto(ray->direction_in_world);
+  }
+  return message;
+}
+
+std::optional<Eigen::Vector2d> PixelInFrame(const MapSnapshot& snapshot, const CameraModel& camera,
+                                            const Eigen::Vector3d& point_in_world) {
+  const std::optional<Eigen::Vector2d> pixel =
+      camera.Project(snapshot.world_from_camera.Inverse() * point_in_world);
+  if (!pixel || !camera.InImage(*pixel)) return std::nullopt;
+  return pixel;
+}
+
+}  // namespace saccade::wire
