@@ -1,0 +1,148 @@
+#include "server/gateway/gateway.hpp"
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <thread>
+#include <unordered_map>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/gateway/http_connection.hpp"
+
+namespace saccade {
+
+namespace net = boost::asio;
+using boost::system::error_code;
+using net::ip::tcp;
+
+absl::Status GatewayOptions::Validate() const {
+  if (port < 0 || port > 65535) {
+    return absl::InvalidArgumentError(absl::StrCat("gateway.port: ", port, " is not 0 to 65535"));
+  }
+  if (max_request_bytes == 0) {
+    return absl::InvalidArgumentError("gateway.max_request_bytes: 0; give at least 1");
+  }
+  if (max_connections <= 0) {
+    return absl::InvalidArgumentError("gateway.max_connections: give at least 1");
+  }
+  if (read_timeout.count() <= 0 || write_timeout.count() <= 0) {
+    return absl::InvalidArgumentError("gateway.read_timeout, write_timeout: give more than 0");
+  }
+  error_code error;
+  net::ip::make_address(host, error);
+  if (error) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("gateway.host: '", host, "' is not an IP address, e.g. 127.0.0.1"));
+  }
+  return absl::OkStatus();
+}
+
+class Gateway::Impl {
+ public:
+  Impl(const GatewayOptions& options, std::shared_ptr<grpc::Channel> channel, StaticFiles files)
+      : options_(options), context_{std::move(files),          HostCheck(options.allowed_hosts),
+                                    options.max_request_bytes, options.read_timeout,
+                                    options.write_timeout,     {}} {
+    context_.call = [this, channel = std::move(channel)](CallRequest request,
+                                                         UpstreamCall::Handlers handlers) {
+      // The guard keeps `Run` going until the call is over, so that its end is never lost.
+      auto guard = std::make_shared<net::executor_work_guard<net::io_context::executor_type>>(
+          io_.get_executor());
+      UpstreamCall::Post post = [guard](std::function<void()> task) {
+        net::post(guard->get_executor(), std::move(task));
+      };
+      return UpstreamCall::Start(channel, std::move(request), std::move(post), std::move(handlers));
+    };
+  }
+
+  absl::Status Listen() {
+    error_code error;
+    const tcp::endpoint endpoint(net::ip::make_address(options_.host),
+                                 static_cast<std::uint16_t>(options_.port));
+    acceptor_.open(endpoint.protocol(), error);
+    if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor_.bind(endpoint, error);
+    if (!error) acceptor_.listen(net::socket_base::max_listen_connections, error);
+    if (error) {
+      return absl::UnavailableError(absl::StrCat("HTTP ", options_.host, ":", options_.port, ": ",
+                                                 error.message(),
+                                                 "; choose another with --http HOST:PORT"));
+    }
+    port_ = acceptor_.local_endpoint().port();
+    Accept();
+    thread_ = std::jthread([this] { io_.run(); });
+    return absl::OkStatus();
+  }
+
+  void Stop() {
+    if (!thread_.joinable()) return;
+    net::post(io_, [this] {
+      stopping_ = true;
+      error_code ignored;
+      acceptor_.close(ignored);
+      retry_.cancel();
+      const auto connections = connections_;  // Close may end some
+      for (const auto& [raw, weak] : connections) {
+        if (const auto connection = weak.lock()) connection->Close();
+      }
+    });
+    thread_.join();  // when every connection and call has ended
+  }
+
+  int port() const { return port_; }
+
+ private:
+  void Accept() {
+    acceptor_.async_accept([this](error_code error, tcp::socket socket) {
+      if (stopping_) return;
+      if (!error) {
+        Serve(std::move(socket));
+        return Accept();
+      }
+      // Out of file descriptors, most likely: wait instead of spinning.
+      retry_.expires_after(std::chrono::milliseconds(100));
+      retry_.async_wait([this](error_code cancelled) {
+        if (!cancelled && !stopping_) Accept();
+      });
+    });
+  }
+
+  void Serve(tcp::socket socket) {
+    if (connections_.size() >= static_cast<std::size_t>(options_.max_connections)) return;
+    error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    const auto connection = HttpConnection::Start(
+        std::move(socket), context_, [this](HttpConnection* gone) { connections_.erase(gone); });
+    connections_[connection.get()] = connection;
+  }
+
+  GatewayOptions options_;
+  HttpContext context_;
+  std::unordered_map<HttpConnection*, std::weak_ptr<HttpConnection>> connections_;
+  bool stopping_ = false;
+  int port_ = 0;
+  net::io_context io_{1};  // destroyed before what its handlers point to
+  tcp::acceptor acceptor_{io_};
+  net::steady_timer retry_{io_};
+  std::jthread thread_;
+};
+
+absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& options,
+                                                        std::shared_ptr<grpc::Channel> channel) {
+  if (const absl::Status valid = options.Validate(); !valid.ok()) return valid;
+  absl::StatusOr<StaticFiles> files = StaticFiles::Load(options.web_root);
+  if (!files.ok()) return files.status();
+  auto impl = std::make_unique<Impl>(options, std::move(channel), *std::move(files));
+  if (const absl::Status listening = impl->Listen(); !listening.ok()) return listening;
+  return std::unique_ptr<Gateway>(new Gateway(std::move(impl)));
+}
+
+Gateway::Gateway(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Gateway::~Gateway() { Stop(); }
+int Gateway::port() const { return impl_->port(); }
+void Gateway::Stop() { impl_->Stop(); }
+
+}  // namespace saccade

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace grpc {
+class Channel;
+}
+
+namespace saccade {
+
+/// How the gateway serves browsers.
+struct GatewayOptions {
+  std::string host = "127.0.0.1";  ///< address to bind, an IP literal
+  int port = 8080;                 ///< 0: any free one, see `Gateway::port`
+  /// The built page (web/dist). Read once at start; absent or empty: a page that says how to build
+  /// it is served in its place.
+  std::filesystem::path web_root;
+  /// Names that browsers may use for this server, besides `localhost`, IP literals and this
+  /// machine's own name. Any other Host is refused: a foreign name that resolves to this address is
+  /// how a foreign page would get in (DNS rebinding).
+  std::vector<std::string> allowed_hosts;
+  std::size_t max_request_bytes = 4 * 1024 * 1024;  ///< body of one RPC
+  int max_connections = 1024;                       ///< further ones are closed at once
+  std::chrono::milliseconds read_timeout{60'000};   ///< an idle or slow request
+  /// One piece of an answer not taken by the browser for so long ends its connection.
+  std::chrono::milliseconds write_timeout{30'000};
+
+  /// InvalidArgument names the field and the remedy.
+  absl::Status Validate() const;
+};
+
+/// HTTP/1.1 server for browsers: the web page's files and gRPC-Web.
+///
+/// Every method of the server is reachable (unary and server streaming) without code here: requests
+/// are translated through `grpc::GenericStub`. One thread of its own; calls wait on gRPC's threads.
+/// A message is asked of gRPC only when the one before has been written to the browser's socket, so
+/// a slow browser costs at most one message of memory and the services see its slowness.
+class Gateway {
+ public:
+  /// Binds and serves until `Stop`. `channel` is usually `grpc::Server::InProcessChannel`; the
+  /// server behind it must outlive the gateway. Errors:
+  ///   InvalidArgument  options, naming the field
+  ///   Unavailable      the address cannot be bound, naming it
+  static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options,
+                                                        std::shared_ptr<grpc::Channel> channel);
+  ~Gateway();
+  Gateway(const Gateway&) = delete;
+  Gateway& operator=(const Gateway&) = delete;
+
+  /// The port bound.
+  int port() const;
+
+  /// Cancels what is under way, closes every connection, joins the thread. May be called twice.
+  void Stop();
+
+ private:
+  class Impl;
+  explicit Gateway(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace saccade

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+#include "server/gateway/host_check.hpp"
+#include "server/gateway/static_files.hpp"
+#include "server/gateway/upstream_call.hpp"
+
+namespace saccade {
+
+/// What every connection of one gateway shares; outlives them.
+struct HttpContext {
+  StaticFiles files;
+  HostCheck hosts;
+  std::size_t max_request_bytes = 0;
+  std::chrono::milliseconds read_timeout{};
+  std::chrono::milliseconds write_timeout{};
+  /// Starts a call to the gRPC server.
+  std::function<std::shared_ptr<UpstreamCall>(CallRequest, UpstreamCall::Handlers)> call;
+};
+
+/// One browser connection: requests one after the other, on the gateway's thread.
+class HttpConnection {
+ public:
+  /// Starts to serve `socket`. Lives until the connection ends; `on_closed` is told then.
+  static std::shared_ptr<HttpConnection> Start(boost::asio::ip::tcp::socket socket,
+                                               const HttpContext& context,
+                                               std::function<void(HttpConnection*)> on_closed);
+  virtual ~HttpConnection() = default;
+  /// Ends it at once, with whatever call is under way.
+  virtual void Close() = 0;
+};
+
+}  // namespace saccade
