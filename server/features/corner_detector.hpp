@@ -70,11 +70,14 @@ class CornerDetector {
                               std::vector<Corner>& corners);
 
  private:
-  /// Min eigenvalue over `area` of `image`; the result has the area's size. Reads up to
+  /// Min eigenvalue over `area` of `image` into score_, which gets the area's size. Reads up to
   /// window / 2 + 1 pixels outside the area, which must lie inside the image.
   void Score(const cv::Mat& image, const cv::Rect& area, int window);
-  void BestOfCells(const ImagePyramid& pyramid, const cv::Rect& area, const cv::Rect& region,
-                   double to_spec, std::span<const Eigen::Vector2d> occupied);
+  /// Best unoccupied pixel of each cell into candidates_; `area` and score_ are of the level.
+  void BestOfCells(const cv::Rect& area, double to_spec, std::span<const Eigen::Vector2d> occupied);
+  void BlankOccupied(const cv::Rect& area, std::span<const Eigen::Vector2d> occupied);
+  int Bands(const ImagePyramid& pyramid) const;
+  cv::Rect Band(const ImagePyramid& pyramid, int index) const;
 
   CornerOptions options_;
   int next_band_ = 0;
@@ -83,7 +86,6 @@ class CornerDetector {
   cv::Mat score_;  // CV_32FC1
   std::vector<int> column_sums_;
   std::vector<int> products_;
-  std::vector<std::uint8_t> blocked_;
   std::vector<Corner> candidates_;
 };
 

@@ -24,9 +24,10 @@ struct PatchTemplate {
   std::array<std::uint8_t, kSize * kSize> pixels{};          // row major
   Eigen::Vector2d birth_pixel = Eigen::Vector2d::Zero();     // of the feature, sub-pixel
   Eigen::Vector3d birth_bearing = Eigen::Vector3d::UnitZ();  // unit, in the birth camera
-  Eigen::Vector2i corner = Eigen::Vector2i::Zero();          // birth-image pixel of pixels[0]
-  cv::Rect valid;                                            // within [0, kSize) x [0, kSize)
-  std::shared_ptr<const CameraModel> camera;                 // lens of the birth view
+  /// The feature in template pixels: kHalf plus the fraction that birth_pixel was cut at.
+  Eigen::Vector2d centre_in_template = Eigen::Vector2d(kHalf, kHalf);
+  cv::Rect valid;                             // within [0, kSize) x [0, kSize)
+  std::shared_ptr<const CameraModel> camera;  // lens of the birth view
 
   std::uint8_t at(int x, int y) const { return pixels[y * kSize + x]; }
 };

@@ -36,6 +36,8 @@ struct SearchOptions {
   int rival_distance_px = 4;
   SubPixel sub_pixel = SubPixel::kLucasKanade;
   int max_iterations = 6;  // of Lucas-Kanade
+  /// Places with less contrast than this never match [grey levels, standard deviation].
+  double min_deviation = 4.0;
   /// Noise floor added to the estimated match covariance [px].
   double noise_floor_px = 0.05;
 
@@ -72,7 +74,8 @@ struct SearchResult {
 
 /// Looks for predicted patches inside their uncertainty ellipses (slam-spec 5.1).
 ///
-/// One instance per thread: it owns scratch memory and allocates nothing after construction.
+/// One instance per thread: it owns scratch memory, which grows to the largest window seen and is
+/// then reused.
 /// Deterministic: ties go to the pixel first in row-major order.
 class PatchSearcher {
  public:
@@ -88,16 +91,32 @@ class PatchSearcher {
  private:
   struct Ellipse;
   struct Window;
-  struct Peak;
+  struct Peak {
+    int x = 0;
+    int y = 0;
+    float zncc = -2.0F;
+  };
+
   SearchResult FindFine(const cv::Mat& image, const CorrelationTemplate& templ,
-                        const Ellipse& ellipse, SearchResult result);
+                        const Ellipse& ellipse);
   SearchResult FindCoarse(const ImagePyramid& pyramid, const WarpedPatch& patch,
-                          const Ellipse& ellipse, SearchResult result);
-  void Refine(const cv::Mat& image, const CorrelationTemplate& templ, SearchResult& result) const;
+                          const Ellipse& ellipse);
+  /// Scores `window` of `image` where `ellipse` (null: everywhere) allows; the rest becomes -2.
+  /// Returns the number of pixels compared.
+  int Scan(const cv::Mat& image, const CorrelationTemplate& templ, const Window& window,
+           const Ellipse* ellipse);
+  Peak Best(const Window& window) const;
+  /// Best local maximum at least rival_distance_px from `best`.
+  float Rival(const Window& window, const Peak& best) const;
+  void TopPeaks(const Window& window);
+  void Finish(const cv::Mat& image, const CorrelationTemplate& templ, const Peak& peak,
+              SearchResult& result);
+  float ScoreAt(const cv::Mat& image, const CorrelationTemplate& templ, int x, int y) const;
 
   SearchOptions options_;
   std::vector<float> scores_;         // of the last scanned window
   std::vector<std::uint8_t> pixels_;  // of the last scanned window, padded to the right
+  std::vector<Peak> peaks_;
 };
 
 }  // namespace saccade

@@ -10,6 +10,7 @@
 
 #include "server/capture/target.hpp"
 #include "server/features/image_pyramid.hpp"
+#include "server/features/patch.hpp"
 #include "server/features/pose_fit.hpp"
 #include "shared/camera/camera_model.hpp"
 
