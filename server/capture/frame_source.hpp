@@ -17,8 +17,8 @@ namespace saccade {
 struct SourceInfo {
   std::string uri;
   std::shared_ptr<const CameraModel> camera;
-  std::optional<Target> target;     // known points, if the place has them
-  std::optional<StartPose> start;   // nominal first pose
+  std::optional<Target> target;    // known points, if the place has them
+  std::optional<StartPose> start;  // nominal first pose
   std::optional<std::uint64_t> frame_count;
 };
 
@@ -33,6 +33,9 @@ class FrameSource {
   /// error means that the source as a whole is gone.
   virtual absl::StatusOr<std::optional<Frame>> Next() = 0;
   virtual std::uint64_t bad_frames() const = 0;
+  /// Makes a Next() that waits for its time return nothing at once, and every later one. Any
+  /// thread.
+  virtual void Stop() {}
 };
 
 }  // namespace saccade

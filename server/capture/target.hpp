@@ -20,14 +20,14 @@ struct KnownPatch {
 struct PatchTarget {
   std::vector<KnownPatch> points;
 };
-/// Inner corners of a chessboard in the plane z = 0 of world; corner (i, j) at (i, j, 0) * square_m,
-/// i < columns along +x, j < rows along +y. Used in the first 30 frames only.
+/// Inner corners of a chessboard in the plane z = 0 of world; corner (i, j) at (i, j, 0) *
+/// square_m, i < columns along +x, j < rows along +y. Used in the first 30 frames only.
 struct ChessboardTarget {
   int columns = 0;
   int rows = 0;
   double square_m = 0;
-  /// Disambiguates the board's half turn: approximate pixels of corner (0,0), of the end of +x and of
-  /// the end of +y in frame 0. Absent: the orientation with corner (0,0) up and left is taken.
+  /// Disambiguates the board's half turn: approximate pixels of corner (0,0), of the end of +x and
+  /// of the end of +y in frame 0. Absent: the orientation with corner (0,0) up and left is taken.
   std::optional<std::array<Eigen::Vector2d, 3>> hint_px;
 };
 using Target = std::variant<PatchTarget, ChessboardTarget>;

@@ -1,0 +1,263 @@
+#include "server/capture/dataset.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <iostream>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+
+#include "server/capture/camera_file.hpp"
+#include "server/capture/image_file.hpp"
+#include "server/capture/image_list.hpp"
+#include "server/capture/target_file.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr std::size_t kReadAhead = 6;  // frames; a few megabytes
+
+/// Decodes frames by index; shared by both ways of delivery. One thread at a time.
+class FrameDecoder {
+ public:
+  FrameDecoder(std::filesystem::path folder, std::vector<ImageEntry> entries,
+               std::shared_ptr<const CameraModel> camera)
+      : folder_(std::move(folder)), entries_(std::move(entries)), camera_(std::move(camera)) {}
+
+  const std::vector<ImageEntry>& entries() const { return entries_; }
+
+  absl::StatusOr<Frame> Decode(std::size_t index) const {
+    const ImageEntry& entry = entries_[index];
+    absl::StatusOr<Picture> picture = LoadPicture(folder_ / entry.file);
+    if (!picture.ok()) return picture.status();
+    if (picture->grey.cols != camera_->width() || picture->grey.rows != camera_->height()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          (folder_ / entry.file).string(), ": is ", picture->grey.cols, "x", picture->grey.rows,
+          " but camera.yaml says ", camera_->width(), "x", camera_->height(),
+          "; correct width and height (and fx, fy, cx, cy with them)"));
+    }
+    Frame frame;
+    frame.id = index;
+    frame.capture_time_ns = entry.time_ns;
+    frame.received_time_ns = MonotonicNow();
+    frame.source_timestamp = entry.timestamp;
+    frame.grey = std::move(picture->grey);
+    frame.color = std::move(picture->color);
+    frame.camera = camera_;
+    return frame;
+  }
+
+ private:
+  std::filesystem::path folder_;
+  std::vector<ImageEntry> entries_;
+  std::shared_ptr<const CameraModel> camera_;
+};
+
+class DatasetSource : public FrameSource {
+ public:
+  DatasetSource(SourceInfo info, FrameDecoder decoder, std::uint64_t first, std::uint64_t end)
+      : decoder_(std::move(decoder)), next_(first), end_(end), info_(std::move(info)) {}
+
+  const SourceInfo& info() const override { return info_; }
+  std::uint64_t bad_frames() const override { return bad_frames_; }
+
+ protected:
+  /// The picture, or nothing if it is bad: then counted and named.
+  std::optional<Frame> DecodeOrReport(std::uint64_t index) {
+    absl::StatusOr<Frame> frame = decoder_.Decode(index);
+    if (frame.ok()) return *std::move(frame);
+    ++bad_frames_;
+    std::cerr << absl::StrCat("frame ", index, " skipped: ", frame.status().message(), "\n");
+    return std::nullopt;
+  }
+
+  const FrameDecoder decoder_;
+  std::uint64_t next_;
+  const std::uint64_t end_;
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  bool stopped_ = false;  // guarded by mutex_
+
+ private:
+  const SourceInfo info_;
+  std::atomic<std::uint64_t> bad_frames_ = 0;
+};
+
+/// Delivers every frame; a thread decodes ahead in order, so the result does not depend on timing.
+class EveryFrameSource final : public DatasetSource {
+ public:
+  using DatasetSource::DatasetSource;
+  ~EveryFrameSource() override { Stop(); }
+
+  absl::StatusOr<std::optional<Frame>> Next() override {
+    std::unique_lock lock(mutex_);
+    if (!reader_.joinable() && !stopped_) {
+      reader_ = std::jthread([this](std::stop_token stop) { ReadAhead(stop); });
+    }
+    changed_.wait(lock, [this] { return stopped_ || done_ || !ready_.empty(); });
+    if (stopped_ || ready_.empty()) return std::nullopt;
+    std::optional<Frame> frame = std::move(ready_.front());
+    ready_.pop_front();
+    changed_.notify_all();
+    frame->received_time_ns = MonotonicNow();
+    return frame;
+  }
+
+  void Stop() override {
+    std::lock_guard lock(mutex_);
+    stopped_ = true;
+    reader_.request_stop();
+    changed_.notify_all();
+  }
+
+ private:
+  void ReadAhead(std::stop_token stop) {
+    for (; next_ < end_ && !stop.stop_requested(); ++next_) {
+      std::optional<Frame> frame = DecodeOrReport(next_);
+      if (!frame) continue;
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [this] { return ready_.size() < kReadAhead; })) return;
+      ready_.push_back(*std::move(frame));
+      changed_.notify_all();
+    }
+    std::lock_guard lock(mutex_);
+    done_ = true;
+    changed_.notify_all();
+  }
+
+  std::deque<Frame> ready_;  // guarded by mutex_
+  bool done_ = false;        // guarded by mutex_
+  std::jthread reader_;      // last: joins before the rest goes
+};
+
+/// Delivers frames when they are due, as the camera would have.
+class RealtimeSource final : public DatasetSource {
+ public:
+  using DatasetSource::DatasetSource;
+
+  absl::StatusOr<std::optional<Frame>> Next() override {
+    if (!started_) {
+      started_ = true;
+      origin_ns_ = MonotonicNow() - TimeOf(next_);
+    }
+    while (next_ < end_) {
+      const Timestamp now = MonotonicNow();
+      while (next_ + 1 < end_ && DueAt(next_ + 1) <= now) ++next_;  // late: the newest wins
+      const std::uint64_t index = next_++;
+      std::optional<Frame> frame = DecodeOrReport(index);
+      if (!frame) continue;
+      if (!WaitUntil(DueAt(index))) return std::nullopt;
+      frame->received_time_ns = MonotonicNow();
+      return frame;
+    }
+    return std::nullopt;
+  }
+
+  void Stop() override {
+    std::lock_guard lock(mutex_);
+    stopped_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  Timestamp TimeOf(std::uint64_t index) const { return decoder_.entries()[index].time_ns; }
+  Timestamp DueAt(std::uint64_t index) const { return origin_ns_ + TimeOf(index); }
+
+  /// False if stopped.
+  bool WaitUntil(Timestamp due_ns) {
+    const std::chrono::steady_clock::time_point due{std::chrono::nanoseconds(due_ns)};
+    std::unique_lock lock(mutex_);
+    changed_.wait_until(lock, due, [this] { return stopped_; });
+    return !stopped_;
+  }
+
+  bool started_ = false;
+  Timestamp origin_ns_ = 0;  // steady clock minus capture clock
+};
+
+absl::Status CheckFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) {
+    return absl::NotFoundError(absl::StrCat(
+        folder.string(), ": no such folder; give the folder that holds rgb.txt and camera.yaml"));
+  }
+  if (std::filesystem::is_directory(folder / "mav0", error)) {
+    return absl::UnimplementedError(absl::StrCat(
+        folder.string(), ": EuRoC layout (mav0/) is not read yet; convert it to TUM layout"));
+  }
+  return absl::OkStatus();
+}
+
+/// Target and start pose, where the folder has them.
+absl::Status ReadFacts(const std::filesystem::path& folder, std::uint64_t first_frame,
+                       SourceInfo* info) {
+  if (std::filesystem::exists(folder / "target.yaml")) {
+    absl::StatusOr<Target> target = LoadTarget(folder / "target.yaml");
+    if (!target.ok()) return target.status();
+    auto* board = std::get_if<ChessboardTarget>(&*target);
+    if (board != nullptr && first_frame > 0) board->hint_px.reset();
+    info->target = *std::move(target);
+  }
+  if (std::filesystem::exists(folder / "start.yaml")) {
+    absl::StatusOr<StartPose> start = LoadStart(folder / "start.yaml");
+    if (!start.ok()) return start.status();
+    if (first_frame == 0) info->start = *start;
+  }
+  return absl::OkStatus();
+}
+
+/// A wrong size in camera.yaml is told at once, by the first picture that can be read at all.
+absl::Status CheckFirstPicture(const FrameDecoder& decoder, std::uint64_t first,
+                               std::uint64_t end) {
+  constexpr std::uint64_t kTries = 50;
+  absl::Status last;
+  for (std::uint64_t i = first; i < std::min(end, first + kTries); ++i) {
+    last = decoder.Decode(i).status();
+    if (last.ok() || last.code() == absl::StatusCode::kInvalidArgument) return last;
+  }
+  return absl::DataLossError(absl::StrCat("no picture can be decoded; ", last.message()));
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenDataset(const std::filesystem::path& folder,
+                                                         const SourceOptions& options) {
+  if (const absl::Status status = CheckFolder(folder); !status.ok()) return status;
+  absl::StatusOr<std::vector<ImageEntry>> entries = LoadImageList(folder / "rgb.txt");
+  if (!entries.ok()) return entries.status();
+  const std::uint64_t count = entries->size();
+  const std::uint64_t end = std::min(options.end_frame.value_or(count), count);
+  if (options.first_frame >= end) {
+    return absl::InvalidArgumentError(absl::StrCat("frames ", options.first_frame, ":",
+                                                   options.end_frame.value_or(count), " is empty; ",
+                                                   folder.string(), " has frames 0:", count));
+  }
+  const absl::StatusOr<CameraIntrinsics> camera =
+      LoadCamera(options.camera_file.empty() ? folder / "camera.yaml" : options.camera_file);
+  if (!camera.ok()) return camera.status();
+
+  SourceInfo info;
+  info.uri = absl::StrCat("dataset:", folder.string());
+  info.camera = std::make_shared<const CameraModel>(*camera);
+  info.frame_count = end - options.first_frame;
+  if (const absl::Status status = ReadFacts(folder, options.first_frame, &info); !status.ok()) {
+    return status;
+  }
+  FrameDecoder decoder(folder, *std::move(entries), info.camera);
+  if (const absl::Status status = CheckFirstPicture(decoder, options.first_frame, end);
+      !status.ok()) {
+    return status;
+  }
+  if (options.realtime) {
+    return std::make_unique<RealtimeSource>(std::move(info), std::move(decoder),
+                                            options.first_frame, end);
+  }
+  return std::make_unique<EveryFrameSource>(std::move(info), std::move(decoder),
+                                            options.first_frame, end);
+}
+
+}  // namespace saccade

@@ -1,0 +1,100 @@
+#include "server/capture/image_list.hpp"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
+
+#include <fstream>
+#include <limits>
+
+namespace saccade {
+namespace {
+
+constexpr std::size_t kMaxLine = 4096;
+
+absl::Status At(const std::filesystem::path& file, int line, absl::string_view problem) {
+  return absl::InvalidArgumentError(absl::StrCat(file.string(), ":", line, ": ", problem));
+}
+
+/// Text of an error's value, so that a binary file does not end on the terminal.
+std::string Quoted(absl::string_view text) {
+  std::string quoted = "'";
+  for (const char c : text.substr(0, 40)) quoted += absl::ascii_isprint(c) ? c : '?';
+  return quoted + (text.size() > 40 ? "...'" : "'");
+}
+
+}  // namespace
+
+absl::StatusOr<Timestamp> ParseSeconds(absl::string_view text) {
+  const auto refuse = [text](absl::string_view why) {
+    return absl::InvalidArgumentError(absl::StrCat("time stamp ", Quoted(text), " ", why));
+  };
+  constexpr Timestamp kMax = std::numeric_limits<Timestamp>::max();
+  Timestamp value = 0;
+  int decimals = -1;  // -1: no point yet
+  bool digits = false;
+  for (const char c : text) {
+    if (c == '.' && decimals < 0) {
+      decimals = 0;
+      continue;
+    }
+    if (!absl::ascii_isdigit(c)) return refuse("is not a decimal number of seconds");
+    digits = true;
+    if (decimals >= 9) continue;  // below a nanosecond
+    if (value > (kMax - 9) / 10) return refuse("is out of range");
+    value = 10 * value + (c - '0');
+    if (decimals >= 0) ++decimals;
+  }
+  if (!digits) return refuse("is not a decimal number of seconds");
+  for (int i = std::max(decimals, 0); i < 9; ++i) {
+    if (value > kMax / 10) return refuse("is out of range");
+    value *= 10;
+  }
+  return value;
+}
+
+absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream) {
+    return absl::NotFoundError(absl::StrCat(
+        file.string(), ": cannot be opened; a data set in TUM layout needs rgb.txt with ",
+        "one line `SECONDS FILE` for each picture"));
+  }
+  std::vector<ImageEntry> entries;
+  std::string text;
+  for (int line = 1; std::getline(stream, text); ++line) {
+    if (text.size() > kMaxLine) return At(file, line, "is too long; is this a text file?");
+    absl::string_view rest = text;
+    if (line == 1) absl::ConsumePrefix(&rest, "\xEF\xBB\xBF");
+    rest = absl::StripAsciiWhitespace(rest);
+    if (rest.empty() || rest.front() == '#') continue;
+    const std::size_t gap = rest.find_first_of(" \t");
+    if (gap == absl::string_view::npos) {
+      return At(file, line, absl::StrCat(Quoted(rest), " has no file name; write `SECONDS FILE`"));
+    }
+    ImageEntry entry;
+    entry.timestamp = std::string(rest.substr(0, gap));
+    entry.file = std::string(absl::StripAsciiWhitespace(rest.substr(gap)));
+    entry.line = line;
+    const absl::StatusOr<Timestamp> time = ParseSeconds(entry.timestamp);
+    if (!time.ok()) {
+      return At(file, line, absl::StrCat(time.status().message(), "; write `SECONDS FILE`"));
+    }
+    entry.time_ns = *time;
+    if (!entries.empty() && entry.time_ns <= entries.back().time_ns) {
+      return At(file, line,
+                absl::StrCat("time stamp ", entry.timestamp, " is not after ",
+                             entries.back().timestamp, " of line ", entries.back().line,
+                             "; sort the lines by time and remove repeated ones"));
+    }
+    entries.push_back(std::move(entry));
+  }
+  if (stream.bad()) return absl::DataLossError(absl::StrCat(file.string(), ": reading failed"));
+  if (entries.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(file.string(), ": lists no picture; write one line `SECONDS FILE` for each"));
+  }
+  return entries;
+}
+
+}  // namespace saccade
