@@ -1,0 +1,121 @@
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <iostream>
+
+#include "client/cli/commands.hpp"
+#include "client/cli/text.hpp"
+
+namespace saccade::cli {
+namespace {
+
+std::string Line(const Annotation& annotation) {
+  return absl::StrCat(Word(annotation.shape), " ", annotation.id, ": ",
+                      Word(annotation.anchor.state), ", ", ErrorText(annotation.anchor), ", ",
+                      PointText(annotation.anchor.point_in_world, false));
+}
+
+std::string FullText(const Annotation& annotation) {
+  const Anchor& anchor = annotation.anchor;
+  return Table(
+      {{"id", annotation.id},
+       {"shape", absl::StrFormat("%s, %.3f m", Word(annotation.shape), annotation.size_m)},
+       {"text", annotation.text.empty() ? "(none)" : annotation.text},
+       {"author", annotation.author},
+       {"revision", absl::StrCat(annotation.revision)},
+       {"state",
+        absl::StrCat(Word(anchor.state), anchor.reason.empty() ? "" : ": ", anchor.reason)},
+       {"error", ErrorText(anchor)},
+       {"point",
+        absl::StrCat(PointText(anchor.point_in_world, false), ", by ", Word(anchor.method))},
+       {"pixel", anchor.pixel ? absl::StrFormat("%.1f,%.1f", anchor.pixel->x(), anchor.pixel->y())
+                              : "out of view"}});
+}
+
+std::string ListText(const std::vector<Annotation>& annotations) {
+  if (annotations.empty()) return "no annotations\n";
+  std::vector<std::vector<std::string>> rows = {{"id", "shape", "state", "error", "text"}};
+  for (const Annotation& annotation : annotations) {
+    rows.push_back({annotation.id, std::string(Word(annotation.shape)),
+                    std::string(Word(annotation.anchor.state)), ErrorText(annotation.anchor),
+                    annotation.text});
+  }
+  return Table(rows);
+}
+
+// The one annotation whose id begins with `prefix`.
+absl::StatusOr<Annotation> Find(net::Connection& connection, const std::string& prefix) {
+  const absl::StatusOr<std::vector<Annotation>> all = connection.ListAnnotations();
+  if (!all.ok()) return all.status();
+  const Annotation* found = nullptr;
+  for (const Annotation& annotation : *all) {
+    if (!absl::StartsWith(annotation.id, prefix)) continue;
+    if (found != nullptr) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("more than one annotation begins with ", prefix, "; give more of the id"));
+    }
+    found = &annotation;
+  }
+  if (found == nullptr || prefix.empty()) {
+    return absl::NotFoundError(absl::StrCat("there is no annotation '", prefix,
+                                            "'; 'saccade annotations' lists those there are"));
+  }
+  return *found;
+}
+
+void PrintDone(const Options& options, absl::string_view verb, absl::string_view what) {
+  if (options.json) {
+    std::cout << nlohmann::json{{verb, what}}.dump() << "\n";
+  } else {
+    std::cout << verb << ": " << what << "\n";
+  }
+}
+
+}  // namespace
+
+absl::Status RunAnnotate(const Options& options, net::Connection& connection) {
+  AnnotationDraft draft = options.draft;
+  if (auto* target = std::get_if<PixelTarget>(&draft.target)) {
+    if (options.frame) {
+      target->frame_id = *options.frame;
+    } else {
+      const absl::StatusOr<net::ServerStatus> status = connection.GetStatus();
+      if (!status.ok()) return status.status();
+      target->frame_id = status->pose.frame_id;
+    }
+  }
+  const absl::StatusOr<Annotation> annotation = connection.CreateAnnotation(std::move(draft));
+  if (!annotation.ok()) return annotation.status();
+  std::cout << (options.json ? ToJson(*annotation).dump(2) : Line(*annotation)) << "\n";
+  return absl::OkStatus();
+}
+
+absl::Status RunAnnotations(const Options& options, net::Connection& connection) {
+  if (options.command == Command::kUndo || options.command == Command::kRedo) {
+    const bool undo = options.command == Command::kUndo;
+    const absl::StatusOr<std::string> done = undo ? connection.Undo() : connection.Redo();
+    if (!done.ok()) return done.status();
+    PrintDone(options, undo ? "undone" : "redone", *done);
+    return absl::OkStatus();
+  }
+  if (options.command == Command::kListAnnotations) {
+    const absl::StatusOr<std::vector<Annotation>> all = connection.ListAnnotations();
+    if (!all.ok()) return all.status();
+    std::cout << (options.json ? ToJson(*all).dump(2) + "\n" : ListText(*all));
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<Annotation> annotation = Find(connection, options.id);
+  if (!annotation.ok()) return annotation.status();
+  if (options.command == Command::kShowAnnotation) {
+    std::cout << (options.json ? ToJson(*annotation).dump(2) + "\n" : FullText(*annotation));
+    return absl::OkStatus();
+  }
+  if (absl::Status deleted = connection.DeleteAnnotation(annotation->id); !deleted.ok()) {
+    return deleted;
+  }
+  PrintDone(options, "deleted", annotation->id);
+  return absl::OkStatus();
+}
+
+}  // namespace saccade::cli

@@ -1,0 +1,205 @@
+#include "client/cli/commands.hpp"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
+
+#include "client/cli/text.hpp"
+
+namespace saccade::cli {
+namespace {
+
+// The whole file or none: what could not be finished is removed.
+absl::Status WriteFile(const std::string& path, const std::string& data) {
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  if (file == nullptr) {
+    return absl::UnavailableError(absl::StrCat("cannot write ", path, ": ", std::strerror(errno),
+                                               "; name another file with --out"));
+  }
+  const bool written = std::fwrite(data.data(), 1, data.size(), file) == data.size();
+  const int write_error = written ? 0 : errno;
+  const bool closed = std::fclose(file) == 0;
+  if (written && closed) return absl::OkStatus();
+  const int error = written ? errno : write_error;
+  std::remove(path.c_str());
+  return absl::UnavailableError(absl::StrCat("cannot finish ", path, ": ", std::strerror(error),
+                                             "; free some space or name another file with --out"));
+}
+
+std::string StatusText(const net::ServerStatus& status) {
+  const MapSnapshot& pose = status.pose;
+  std::vector<std::vector<std::string>> rows;
+  rows.push_back({"source", absl::StrCat(status.source, status.source_ended ? " (ended)" : "")});
+  rows.push_back(
+      {"server", absl::StrFormat("%s, up %.0f s", status.server_version, status.uptime_s)});
+  rows.push_back(
+      {"tracking", absl::StrCat(Word(pose.status), ", quality ", Word(pose.quality),
+                                pose.advice.empty() ? "" : absl::StrCat(": ", pose.advice))});
+  rows.push_back({"camera", PointText(pose.world_from_camera.translation, pose.metric)});
+  rows.push_back({"frame", absl::StrFormat("%d, matched %d of %d", pose.frame_id, pose.matched,
+                                           pose.attempted)});
+  rows.push_back(
+      {"rate", absl::StrFormat("captured %.1f, tracked %.1f, encoded %.1f fps; %.0f kbit/s",
+                               status.statistics.captured_fps_hz, status.statistics.tracked_fps_hz,
+                               status.statistics.encoded_fps_hz,
+                               1e-3 * status.statistics.video_bit_rate_bit_s)});
+  rows.push_back(
+      {"time", absl::StrFormat("track %.1f ms (p95 %.1f), encode %.1f ms (p95 %.1f)",
+                               status.statistics.track_ms_p50, status.statistics.track_ms_p95,
+                               status.statistics.encode_ms_p50, status.statistics.encode_ms_p95)});
+  rows.push_back({"map", absl::StrFormat("%d features, %s", status.map_features,
+                                         pose.metric ? "metric" : "scale unknown")});
+  rows.push_back({"annotations", absl::StrCat(status.annotations)});
+  std::string people;
+  for (const net::Participant& participant : status.participants) {
+    absl::StrAppend(&people, people.empty() ? "" : ", ", participant.display_name, " (",
+                    Word(participant.role), ")");
+  }
+  rows.push_back({"present", people.empty() ? "nobody" : people});
+  return Table(rows);
+}
+
+std::string MapText(const net::MapState& map) {
+  std::vector<std::vector<std::string>> rows = {
+      {"id", "state", map.metric ? "point [m]" : "point", "sigma", "matched"}};
+  for (const FeatureSnapshot& feature : map.features) {
+    const double sigma = std::sqrt(feature.covariance_in_world.diagonal().maxCoeff());
+    rows.push_back({absl::StrCat(feature.id), std::string(Word(feature.state)),
+                    PointText(feature.point_in_world, false), absl::StrFormat("%.4f", sigma),
+                    absl::StrCat(feature.matched_count)});
+  }
+  return absl::StrFormat("%d features at frame %d, generation %d, revision %d, %s\n%s",
+                         map.features.size(), map.frame_id, map.generation, map.revision,
+                         map.metric ? "metric" : "scale unknown", Table(rows));
+}
+
+// One line a second.
+class WatchPrinter {
+ public:
+  explicit WatchPrinter(bool json) : json_(json) {}
+
+  void Print(const net::WatchEvent& event) {
+    if (json_) {
+      std::cout << ToJson(event).dump() << std::endl;
+      return;
+    }
+    if (const auto* pose = std::get_if<MapSnapshot>(&event)) {
+      pose_ = *pose;
+      ++poses_;
+    } else if (const auto* statistics = std::get_if<net::Statistics>(&event)) {
+      PrintLine(*statistics);
+    } else if (const auto* change = std::get_if<net::AnnotationChange>(&event)) {
+      // Anchors move with each frame; what is worth a line is what comes and goes.
+      for (const std::string& id : change->removed_ids) std::cout << "removed " << id << std::endl;
+    } else if (const auto* end = std::get_if<net::SourceEnd>(&event)) {
+      std::cout << "the source ended after " << end->frames << " frames" << std::endl;
+    }
+  }
+
+ private:
+  void PrintLine(const net::Statistics& statistics) {
+    std::cout << absl::StrFormat(
+                     "frame %d  %s %s  %s  %.1f fps  track %.1f ms  matched %d of %d%s%s",
+                     pose_.frame_id, Word(pose_.status), Word(pose_.quality),
+                     PointText(pose_.world_from_camera.translation, pose_.metric),
+                     statistics.tracked_fps_hz, statistics.track_ms_p50, pose_.matched,
+                     pose_.attempted, pose_.advice.empty() ? "" : "  ", pose_.advice)
+              << std::endl;
+  }
+
+  bool json_;
+  int poses_ = 0;
+  MapSnapshot pose_;
+};
+
+}  // namespace
+
+absl::Status RunStatus(const Options& options, net::Connection& connection) {
+  const absl::StatusOr<net::ServerStatus> status = connection.GetStatus();
+  if (!status.ok()) return status.status();
+  std::cout << (options.json ? ToJson(*status).dump(2) + "\n" : StatusText(*status));
+  return absl::OkStatus();
+}
+
+absl::Status RunWatch(const Options& options, net::Connection& connection) {
+  WatchPrinter printer(options.json);
+  const auto end = std::chrono::steady_clock::now() +
+                   std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.watch_s));
+  return connection.Watch([&](const net::WatchEvent& event) {
+    printer.Print(event);
+    return options.watch_s <= 0 || std::chrono::steady_clock::now() < end;
+  });
+}
+
+absl::Status RunMap(const Options& options, net::Connection& connection) {
+  if (options.out.empty()) {
+    const absl::StatusOr<net::MapState> map = connection.GetMap();
+    if (!map.ok()) return map.status();
+    std::cout << (options.json ? ToJson(*map).dump(2) + "\n" : MapText(*map));
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<net::MapExport> exported = connection.ExportMap();
+  if (!exported.ok()) return exported.status();
+  if (absl::Status written = WriteFile(options.out, exported->data); !written.ok()) return written;
+  if (options.json) {
+    std::cout << nlohmann::json{{"out", options.out}, {"features", exported->feature_count}}.dump()
+              << "\n";
+  } else {
+    std::cout << absl::StrFormat("%s: %d features\n", options.out, exported->feature_count);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RunSnapshot(const Options& options, net::Connection& connection) {
+  const absl::StatusOr<net::Still> still = connection.GetFrame(options.frame, options.view);
+  if (!still.ok()) return still.status();
+  if (absl::Status written = WriteFile(options.out, still->png); !written.ok()) return written;
+  if (options.json) {
+    std::cout << nlohmann::json{{"out", options.out},
+                                {"frame_id", still->frame_id},
+                                {"width_px", still->intrinsics.width},
+                                {"height_px", still->intrinsics.height},
+                                {"pose", ToJson(still->pose)}}
+                     .dump()
+              << "\n";
+  } else {
+    std::cout << absl::StrFormat("%s: frame %d, %d x %d, %s\n", options.out, still->frame_id,
+                                 still->intrinsics.width, still->intrinsics.height,
+                                 Word(still->pose.status));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Run(const Options& options, net::Connection& connection) {
+  switch (options.command) {
+    case Command::kStatus:
+      return RunStatus(options, connection);
+    case Command::kWatch:
+      return RunWatch(options, connection);
+    case Command::kMap:
+      return RunMap(options, connection);
+    case Command::kSnapshot:
+      return RunSnapshot(options, connection);
+    case Command::kAnnotate:
+      return RunAnnotate(options, connection);
+    case Command::kListAnnotations:
+    case Command::kShowAnnotation:
+    case Command::kDeleteAnnotation:
+    case Command::kUndo:
+    case Command::kRedo:
+      return RunAnnotations(options, connection);
+    case Command::kFixate:
+    case Command::kRelease:
+    case Command::kHome:
+      break;
+  }
+  return absl::UnimplementedError(
+      "not available yet: no mount; the camera is fixed to the wearer, so ask them to turn");
+}
+
+}  // namespace saccade::cli

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include "client/cli/options.hpp"
+#include "client/net/connection.hpp"
+
+namespace saccade::cli {
+
+/// Runs one command against a server and prints its answer to stdout. Errors are the caller's to
+/// print.
+absl::Status Run(const Options& options, net::Connection& connection);
+
+// One per group of commands; Run() picks.
+absl::Status RunStatus(const Options& options, net::Connection& connection);
+absl::Status RunWatch(const Options& options, net::Connection& connection);
+absl::Status RunMap(const Options& options, net::Connection& connection);
+absl::Status RunSnapshot(const Options& options, net::Connection& connection);
+absl::Status RunAnnotate(const Options& options, net::Connection& connection);
+absl::Status RunAnnotations(const Options& options, net::Connection& connection);
+
+}  // namespace saccade::cli

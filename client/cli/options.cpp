@@ -1,0 +1,241 @@
+#include "client/cli/options.hpp"
+
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+namespace saccade::cli {
+namespace {
+
+// As typed, before it is checked.
+struct Raw {
+  double timeout_s = 5;
+  std::string view = "raw";
+  std::string shape = "cube";
+  std::string pixel, point, stroke;
+  std::optional<std::uint64_t> feature;
+  std::string annotation;  // fixate
+};
+
+const std::map<std::string, AnnotationShape>& Shapes() {
+  static const std::map<std::string, AnnotationShape> shapes = {{"cube", AnnotationShape::kCube},
+                                                                {"note", AnnotationShape::kNote},
+                                                                {"arrow", AnnotationShape::kArrow},
+                                                                {"ink", AnnotationShape::kInk}};
+  return shapes;
+}
+
+absl::StatusOr<std::vector<double>> ParseList(absl::string_view text) {
+  std::vector<double> numbers;
+  for (const absl::string_view part : absl::StrSplit(text, ',')) {
+    double number = 0;
+    if (!absl::SimpleAtod(part, &number) || !std::isfinite(number)) {
+      return absl::InvalidArgumentError(absl::StrCat("'", part, "' is not a finite number"));
+    }
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+// A validator that leaves the text as it is.
+template <typename Parse>
+CLI::Validator Checked(Parse parse, const std::string& form) {
+  return CLI::Validator(
+      [parse](std::string& text) {
+        const auto parsed = parse(text);
+        return parsed.ok() ? std::string() : std::string(parsed.status().message());
+      },
+      form);
+}
+
+void AddMapAndPictures(CLI::App& app, Options& options, Raw& raw) {
+  app.add_subcommand("status", "What the server is doing now");
+  CLI::App* watch =
+      app.add_subcommand("watch", "Follow it: a line a second, or each event as JSON");
+  watch->add_option("--for", options.watch_s, "End after so many seconds")
+      ->check(CLI::Range(0.001, 1e9));
+  CLI::App* map = app.add_subcommand("map", "The map's features");
+  map->add_option("--out", options.out, "Write it to this file as PLY (x y z in metres, colour)");
+  CLI::App* snapshot = app.add_subcommand("snapshot", "One picture as PNG");
+  snapshot->add_option("--view", raw.view, "raw (as captured) or augmented (marks drawn in)")
+      ->check(CLI::IsMember({"raw", "augmented"}))
+      ->required();
+  snapshot->add_option("--out", options.out, "The file to write")->required();
+  snapshot->add_option("--frame", options.frame, "Frame id (kept for 10 s); else the newest")
+      ->check(CLI::NonNegativeNumber);
+}
+
+void AddAnnotate(CLI::App& app, Options& options, Raw& raw) {
+  CLI::App* annotate = app.add_subcommand("annotate", "Place an annotation");
+  CLI::Option* pixel =
+      annotate->add_option("--pixel", raw.pixel, "U,V in the raw picture; (0,0) is its first pixel")
+          ->check(Checked([](const std::string& t) { return ParseNumbers(t, 2); }, "U,V"));
+  annotate->add_option("--frame", options.frame, "Frame id of that picture; else the newest")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(pixel);
+  CLI::Option* feature = annotate->add_option("--feature", raw.feature, "Id of a feature")
+                             ->check(CLI::NonNegativeNumber);
+  CLI::Option* point =
+      annotate->add_option("--point", raw.point, "X,Y,Z in world [m]")
+          ->check(Checked([](const std::string& t) { return ParseNumbers(t, 3); }, "X,Y,Z"));
+  pixel->excludes(feature)->excludes(point);
+  feature->excludes(point);
+  annotate->add_option("--shape", raw.shape, "cube, note, arrow or ink")
+      ->check(CLI::IsMember({"cube", "note", "arrow", "ink"}))
+      ->capture_default_str();
+  annotate->add_option("--text", options.draft.text, "Text, at most 500 bytes");
+  annotate->add_option("--size", options.draft.size_m, "Size [m]")
+      ->check(CLI::Range(0.001, 10.0))
+      ->capture_default_str();
+  annotate->add_option("--stroke", raw.stroke, "U1,V1,U2,V2,... of an ink shape, with --pixel")
+      ->needs(pixel)
+      ->check(Checked(ParseStroke, "U1,V1,U2,V2,..."));
+}
+
+void AddAnnotations(CLI::App& app, Options& options) {
+  CLI::App* annotations = app.add_subcommand("annotations", "List, show, delete or undo");
+  annotations->require_subcommand(0, 1);
+  annotations->add_subcommand("list", "All of them (this is what no word means)");
+  CLI::App* show = annotations->add_subcommand("show", "One of them in full");
+  show->add_option("id", options.id, "Its id, or the beginning of it")->required();
+  CLI::App* remove = annotations->add_subcommand("delete", "Delete one");
+  remove->add_option("id", options.id, "Its id, or the beginning of it")->required();
+  annotations->add_subcommand("undo", "Take back your own last change");
+  annotations->add_subcommand("redo", "Make it again");
+}
+
+void AddGaze(CLI::App& app, Raw& raw) {
+  CLI::App* fixate = app.add_subcommand("fixate", "Turn the camera to a point and hold it there");
+  fixate->add_option("--annotation", raw.annotation, "Id of an annotation");
+  fixate->add_option("--feature", raw.feature, "Id of a feature")->check(CLI::NonNegativeNumber);
+  fixate->add_option("--point", raw.point, "X,Y,Z in world [m]")
+      ->check(Checked([](const std::string& t) { return ParseNumbers(t, 3); }, "X,Y,Z"));
+  app.add_subcommand("release", "Let the camera go");
+  app.add_subcommand("home", "Turn the camera straight ahead");
+}
+
+Command CommandOf(const CLI::App& app) {
+  static const std::map<std::string, Command> commands = {
+      {"status", Command::kStatus},
+      {"watch", Command::kWatch},
+      {"map", Command::kMap},
+      {"snapshot", Command::kSnapshot},
+      {"annotate", Command::kAnnotate},
+      {"annotations", Command::kListAnnotations},
+      {"list", Command::kListAnnotations},
+      {"show", Command::kShowAnnotation},
+      {"delete", Command::kDeleteAnnotation},
+      {"undo", Command::kUndo},
+      {"redo", Command::kRedo},
+      {"fixate", Command::kFixate},
+      {"release", Command::kRelease},
+      {"home", Command::kHome}};
+  const CLI::App* chosen = app.get_subcommands().front();
+  if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
+  return commands.at(chosen->get_name());
+}
+
+// What CLI11 cannot say: exactly one target, strokes only for ink.
+absl::Status FinishDraft(const Raw& raw, AnnotationDraft& draft) {
+  draft.shape = Shapes().at(raw.shape);
+  if (!raw.pixel.empty()) {
+    const std::vector<double> uv = *ParseNumbers(raw.pixel, 2);
+    draft.target = PixelTarget{0, {uv[0], uv[1]}};
+  } else if (raw.feature) {
+    draft.target = FeatureTarget{*raw.feature};
+  } else if (!raw.point.empty()) {
+    const std::vector<double> xyz = *ParseNumbers(raw.point, 3);
+    draft.target = PointTarget{{xyz[0], xyz[1], xyz[2]}};
+  } else {
+    return absl::InvalidArgumentError("annotate needs --pixel U,V, --feature ID or --point X,Y,Z");
+  }
+  const bool ink = draft.shape == AnnotationShape::kInk;
+  if (ink != !raw.stroke.empty()) {
+    return absl::InvalidArgumentError(ink ? "--shape ink needs --stroke U1,V1,U2,V2,..."
+                                          : "--stroke is for --shape ink only");
+  }
+  if (ink) draft.ink_px = *ParseStroke(raw.stroke);
+  return absl::OkStatus();
+}
+
+int Usage(absl::string_view problem) {
+  std::fprintf(stderr, "saccade: %s; see saccade --help\n", std::string(problem).c_str());
+  return kBadUsage;
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<double>> ParseNumbers(absl::string_view text, std::size_t count) {
+  absl::StatusOr<std::vector<double>> numbers = ParseList(text);
+  if (numbers.ok() && numbers->size() != count) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("'", text, "' has ", numbers->size(), " numbers, not ", count));
+  }
+  return numbers;
+}
+
+absl::StatusOr<std::vector<Eigen::Vector2d>> ParseStroke(absl::string_view text) {
+  const absl::StatusOr<std::vector<double>> numbers = ParseList(text);
+  if (!numbers.ok()) return numbers.status();
+  if (numbers->size() < 4 || numbers->size() % 2 != 0) {
+    return absl::InvalidArgumentError("a stroke is at least two pixels: U1,V1,U2,V2");
+  }
+  std::vector<Eigen::Vector2d> stroke;
+  for (std::size_t i = 0; i < numbers->size(); i += 2) {
+    stroke.emplace_back((*numbers)[i], (*numbers)[i + 1]);
+  }
+  return stroke;
+}
+
+ParseResult ParseCommandLine(int argc, const char* const* argv) {
+  Options options;
+  Raw raw;
+  options.connection.display_name = "saccade";
+  CLI::App app("Talks to a Saccade server: what it sees, its map, its annotations.", "saccade");
+  app.set_version_flag("--version", std::string("saccade ") + SACCADE_VERSION);
+  app.add_option("--server", options.connection.server, "HOST:PORT of the server's gRPC address")
+      ->capture_default_str();
+  app.add_option("--timeout", raw.timeout_s, "Seconds to wait for an answer")
+      ->check(CLI::Range(0.05, 3600.0))
+      ->capture_default_str();
+  app.add_option("--name", options.connection.display_name, "Your name, as the others see it")
+      ->capture_default_str();
+  app.add_flag("--json", options.json, "Print JSON instead of text");
+  app.require_subcommand(1);
+  app.fallthrough();
+  AddMapAndPictures(app, options, raw);
+  AddAnnotate(app, options, raw);
+  AddAnnotations(app, options);
+  AddGaze(app, raw);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return {std::nullopt, app.exit(error)};  // help and version
+    if (app.get_subcommands().empty() && app.remaining_size() > 0) {
+      return {std::nullopt, Usage(absl::StrCat("there is no command '", app.remaining()[0], "'"))};
+    }
+    return {std::nullopt, Usage(error.what())};
+  }
+  options.command = CommandOf(app);
+  options.view = raw.view == "raw" ? net::VideoView::kRaw : net::VideoView::kAugmented;
+  options.connection.deadline =
+      std::chrono::milliseconds(static_cast<std::int64_t>(raw.timeout_s * 1000));
+  if (absl::Status valid = options.connection.Validate(); !valid.ok()) {
+    return {std::nullopt, Usage(valid.message())};
+  }
+  if (options.command == Command::kAnnotate) {
+    if (absl::Status done = FinishDraft(raw, options.draft); !done.ok()) {
+      return {std::nullopt, Usage(done.message())};
+    }
+  }
+  return {std::move(options), kSuccess};
+}
+
+}  // namespace saccade::cli

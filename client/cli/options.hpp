@@ -1,0 +1,63 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/net/connection.hpp"
+#include "shared/scene/annotation.hpp"
+
+namespace saccade::cli {
+
+/// Exit codes (architecture, section 4).
+inline constexpr int kSuccess = 0, kFailure = 1, kBadUsage = 2;
+
+enum class Command {
+  kStatus,
+  kWatch,
+  kMap,
+  kSnapshot,
+  kAnnotate,
+  kListAnnotations,
+  kShowAnnotation,
+  kDeleteAnnotation,
+  kUndo,
+  kRedo,
+  kFixate,
+  kRelease,
+  kHome,
+};
+
+/// The command line, parsed and checked.
+struct Options {
+  Command command = Command::kStatus;
+  net::ConnectionOptions connection;
+  bool json = false;
+  std::string out;                             // map, snapshot: the file to write
+  net::VideoView view = net::VideoView::kRaw;  // snapshot
+  std::optional<FrameId> frame;                // snapshot, annotate --pixel; nothing: the newest
+  std::string id;                              // show, delete: UUID or the beginning of one
+  double watch_s = 0;                          // watch: end after this time; 0: never
+  AnnotationDraft draft;                       // annotate; frame_id 0 until `frame` is known
+};
+
+/// `count` finite numbers separated by commas: "319.5,239.5".
+absl::StatusOr<std::vector<double>> ParseNumbers(absl::string_view text, std::size_t count);
+
+/// Any even number (at least 4) of finite numbers: "U1,V1,U2,V2,...".
+absl::StatusOr<std::vector<Eigen::Vector2d>> ParseStroke(absl::string_view text);
+
+/// Either options, or the code with which the program ends at once: help and version (0), bad usage
+/// (2). Whatever there is to say is printed.
+struct ParseResult {
+  std::optional<Options> options;
+  int exit_code = kSuccess;
+};
+ParseResult ParseCommandLine(int argc, const char* const* argv);
+
+}  // namespace saccade::cli

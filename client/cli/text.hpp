@@ -1,0 +1,38 @@
+#pragma once
+
+#include <absl/strings/string_view.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client/net/types.hpp"
+
+/// Domain types as words and as JSON. The same words as in the interface and the API; units are in
+/// the JSON names. Pure functions.
+namespace saccade::cli {
+
+absl::string_view Word(TrackingStatus status);
+absl::string_view Word(TrackingQuality quality);
+absl::string_view Word(FeatureState state);
+absl::string_view Word(AnnotationShape shape);
+absl::string_view Word(AnchorState state);
+absl::string_view Word(AnchorMethod method);
+absl::string_view Word(net::Role role);
+
+nlohmann::json ToJson(const MapSnapshot& pose);
+nlohmann::json ToJson(const net::Statistics& statistics);
+nlohmann::json ToJson(const net::ServerStatus& status);
+nlohmann::json ToJson(const net::MapState& map);
+nlohmann::json ToJson(const Annotation& annotation);
+nlohmann::json ToJson(const std::vector<Annotation>& annotations);
+nlohmann::json ToJson(const net::WatchEvent& event);
+
+/// "x 0.123 y -0.045 z 1.200 m"; of a world without scale, without the unit.
+std::string PointText(const Eigen::Vector3d& point, bool metric);
+/// "0.8 px 3 mm", or "out of view 3 mm".
+std::string ErrorText(const Anchor& anchor);
+/// Columns padded to the same width, two blanks apart, one row a line.
+std::string Table(const std::vector<std::vector<std::string>>& rows);
+
+}  // namespace saccade::cli

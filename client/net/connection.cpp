@@ -1,0 +1,287 @@
+#include "client/net/connection.hpp"
+
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <grpcpp/grpcpp.h>
+
+#include <random>
+#include <utility>
+
+#include "client/net/convert.hpp"
+#include "saccade/v1/annotation.grpc.pb.h"
+#include "saccade/v1/map.grpc.pb.h"
+#include "saccade/v1/session.grpc.pb.h"
+#include "shared/wire/from_proto.hpp"
+#include "shared/wire/to_proto.hpp"
+
+namespace saccade::net {
+namespace {
+
+constexpr int kMaxAnswerBytes = 64 << 20;  // a lossless picture of a large camera
+constexpr std::uint32_t kWindow = 32;      // events in flight unacknowledged
+constexpr std::uint64_t kAcknowledgeEvery = 8;
+
+grpc::ChannelArguments ChannelArguments() {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxAnswerBytes);
+  // Small windows bound what piles up in the transport while a reader is slow.
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 65536);
+  // A proxy of the environment has no business between an expert and a wearable.
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  return arguments;
+}
+
+}  // namespace
+
+std::string RandomUuid() {
+  std::random_device device;
+  std::uint32_t word[4];
+  for (std::uint32_t& w : word) w = device();
+  return absl::StrFormat("%08x-%04x-4%03x-%04x-%04x%08x", word[0], word[1] >> 16, word[1] & 0xfff,
+                         0x8000 | ((word[2] >> 16) & 0x3fff), word[2] & 0xffff, word[3]);
+}
+
+absl::Status ConnectionOptions::Validate() const {
+  const auto colon = server.rfind(':');
+  int port = 0;
+  if (colon == std::string::npos || colon == 0 ||
+      !absl::SimpleAtoi(server.substr(colon + 1), &port) || port < 1 || port > 65535) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("server '", server, "' is not HOST:PORT, for example 127.0.0.1:50051"));
+  }
+  if (deadline.count() <= 0) return absl::InvalidArgumentError("the deadline must be above 0 s");
+  return absl::OkStatus();
+}
+
+class Connection::Impl {
+ public:
+  explicit Impl(const ConnectionOptions& options)
+      : options_(options),
+        session_id_(options.session_id),
+        channel_(grpc::CreateCustomChannel(options.server, grpc::InsecureChannelCredentials(),
+                                           ChannelArguments())),
+        session_(v1::SessionService::NewStub(channel_)),
+        map_(v1::MapService::NewStub(channel_)),
+        annotation_(v1::AnnotationService::NewStub(channel_)) {}
+
+  // One unary call with this connection's deadline.
+  template <typename Stub, typename Request, typename Response>
+  absl::StatusOr<Response> Call(Stub& stub,
+                                grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                             Response*),
+                                const Request& request) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + options_.deadline);
+    Response response;
+    const grpc::Status status = (stub.*method)(&context, request, &response);
+    if (!status.ok()) return Explain(status);
+    return response;
+  }
+
+  // A call that names the session. If the server has forgotten it (it restarted), joins anew, once.
+  template <typename Stub, typename Request, typename Response>
+  absl::StatusOr<Response> CallInSession(Stub& stub,
+                                         grpc::Status (Stub::*method)(grpc::ClientContext*,
+                                                                      const Request&, Response*),
+                                         Request request) {
+    const bool had_session = !session_id_.empty();
+    if (absl::Status joined = Join(); !joined.ok()) return joined;
+    request.set_session_id(session_id_);
+    absl::StatusOr<Response> response = Call(stub, method, request);
+    if (response.ok() || !had_session || !IsForgottenSession(response.status())) return response;
+    session_id_.clear();
+    if (absl::Status joined = Join(); !joined.ok()) return joined;
+    request.set_session_id(session_id_);
+    return Call(stub, method, request);
+  }
+
+  absl::Status Join() {
+    if (!session_id_.empty()) return absl::OkStatus();
+    v1::JoinRequest request;
+    request.set_display_name(options_.display_name);
+    request.set_role(ToProto(options_.role));
+    absl::StatusOr<v1::JoinResponse> response =
+        Call(*session_, &v1::SessionService::Stub::Join, request);
+    if (!response.ok()) return response.status();
+    session_id_ = response->session_id();
+    return absl::OkStatus();
+  }
+
+  absl::Status Explain(const grpc::Status& status) const {
+    const auto code = static_cast<absl::StatusCode>(status.error_code());
+    switch (status.error_code()) {
+      case grpc::StatusCode::UNAVAILABLE:
+        return absl::Status(
+            code, absl::StrCat("no server answers at ", options_.server,
+                               "; start saccade-server, or name another with --server HOST:PORT"));
+      case grpc::StatusCode::DEADLINE_EXCEEDED:
+        return absl::Status(
+            code, absl::StrFormat("%s did not answer within %.1f s; is it busy, or is that port "
+                                  "not Saccade's gRPC port? (--timeout waits longer)",
+                                  options_.server, 1e-3 * options_.deadline.count()));
+      case grpc::StatusCode::UNIMPLEMENTED:
+        return absl::Status(
+            code, absl::StrCat("the server at ", options_.server, " does not offer this (",
+                               status.error_message(), "); is it another version?"));
+      default:
+        return absl::Status(code, status.error_message());
+    }
+  }
+
+  static bool IsForgottenSession(const absl::Status& status) {
+    return status.message().find("session_id") != absl::string_view::npos &&
+           (absl::IsNotFound(status) || absl::IsFailedPrecondition(status) ||
+            absl::IsUnauthenticated(status) || absl::IsInvalidArgument(status));
+  }
+
+  void Acknowledge(std::uint64_t sequence) {
+    v1::AcknowledgeRequest request;
+    request.set_session_id(session_id_);
+    request.set_sequence(sequence);
+    // A lost acknowledgement is made good by the next: they are cumulative.
+    Call(*session_, &v1::SessionService::Stub::Acknowledge, request).IgnoreError();
+  }
+
+  absl::Status Watch(const std::function<bool(const WatchEvent&)>& on_event) {
+    if (absl::Status joined = Join(); !joined.ok()) return joined;
+    v1::SubscribeRequest request;
+    request.set_session_id(session_id_);
+    request.set_window(kWindow);
+    for (const v1::Topic topic :
+         {v1::TOPIC_POSE, v1::TOPIC_ANNOTATION, v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS}) {
+      request.add_topics(topic);
+    }
+    grpc::ClientContext context;
+    const std::unique_ptr<grpc::ClientReader<v1::Event>> reader =
+        session_->Subscribe(&context, request);
+    v1::Event message;
+    absl::Status failure;
+    bool more = true;
+    while (more && reader->Read(&message)) {
+      if (message.sequence() % kAcknowledgeEvery == 0) Acknowledge(message.sequence());
+      absl::StatusOr<std::optional<WatchEvent>> event = FromProto(message);
+      if (!event.ok()) failure = event.status();
+      more = event.ok() && (!event->has_value() || on_event(**event));
+    }
+    if (!more) context.TryCancel();
+    const grpc::Status status = reader->Finish();
+    if (!more) return failure;
+    return status.ok() ? absl::OkStatus() : Explain(status);
+  }
+
+  const ConnectionOptions options_;
+  std::string session_id_;
+  const std::shared_ptr<grpc::Channel> channel_;
+  const std::unique_ptr<v1::SessionService::Stub> session_;
+  const std::unique_ptr<v1::MapService::Stub> map_;
+  const std::unique_ptr<v1::AnnotationService::Stub> annotation_;
+};
+
+Connection::Connection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Connection::~Connection() = default;
+
+absl::StatusOr<std::unique_ptr<Connection>> Connection::Create(const ConnectionOptions& options) {
+  if (absl::Status valid = options.Validate(); !valid.ok()) return valid;
+  return std::unique_ptr<Connection>(new Connection(std::make_unique<Impl>(options)));
+}
+
+absl::StatusOr<std::string> Connection::Session() {
+  if (absl::Status joined = impl_->Join(); !joined.ok()) return joined;
+  return impl_->session_id_;
+}
+
+absl::StatusOr<ServerStatus> Connection::GetStatus() {
+  auto response =
+      impl_->Call(*impl_->session_, &v1::SessionService::Stub::GetStatus, v1::GetStatusRequest());
+  if (!response.ok()) return response.status();
+  return FromProto(*response);
+}
+
+absl::StatusOr<Still> Connection::GetFrame(std::optional<FrameId> frame_id, VideoView view) {
+  v1::GetFrameRequest request;
+  if (frame_id) request.set_frame_id(*frame_id);
+  request.set_view(ToProto(view));
+  auto response = impl_->Call(*impl_->session_, &v1::SessionService::Stub::GetFrame, request);
+  if (!response.ok()) return response.status();
+  return FromProto(*response);
+}
+
+absl::StatusOr<MapState> Connection::GetMap() {
+  auto response = impl_->Call(*impl_->map_, &v1::MapService::Stub::Get, v1::GetMapRequest());
+  if (!response.ok()) return response.status();
+  return FromProto(*response);
+}
+
+absl::StatusOr<MapExport> Connection::ExportMap() {
+  v1::ExportMapRequest request;
+  request.set_format(v1::ExportMapRequest::FORMAT_PLY);
+  auto response = impl_->Call(*impl_->map_, &v1::MapService::Stub::Export, request);
+  if (!response.ok()) return response.status();
+  return MapExport{std::move(*response->mutable_data()), response->feature_count()};
+}
+
+absl::StatusOr<std::uint64_t> Connection::ResetMap() {
+  auto response = impl_->Call(*impl_->map_, &v1::MapService::Stub::Reset, v1::ResetMapRequest());
+  if (!response.ok()) return response.status();
+  return response->map_generation();
+}
+
+absl::StatusOr<Annotation> Connection::CreateAnnotation(AnnotationDraft draft) {
+  v1::CreateAnnotationRequest request;
+  request.set_request_id(draft.request_id.empty() ? RandomUuid() : draft.request_id);
+  *request.mutable_draft() = ToProto(draft);
+  auto response = impl_->CallInSession(*impl_->annotation_, &v1::AnnotationService::Stub::Create,
+                                       std::move(request));
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->annotation(), "annotation");
+}
+
+absl::StatusOr<Annotation> Connection::UpdateAnnotation(const AnnotationPatch& patch) {
+  v1::UpdateAnnotationRequest request;
+  request.set_id(patch.id);
+  if (patch.text) request.set_text(*patch.text);
+  if (patch.size_m) request.set_size_m(*patch.size_m);
+  if (patch.color_rgba) request.set_color_rgba(*patch.color_rgba);
+  if (patch.target) *request.mutable_target() = wire::ToProto(*patch.target);
+  auto response = impl_->CallInSession(*impl_->annotation_, &v1::AnnotationService::Stub::Update,
+                                       std::move(request));
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->annotation(), "annotation");
+}
+
+absl::StatusOr<std::vector<Annotation>> Connection::ListAnnotations() {
+  auto response = impl_->Call(*impl_->annotation_, &v1::AnnotationService::Stub::List,
+                              v1::ListAnnotationsRequest());
+  if (!response.ok()) return response.status();
+  return FromProto(response->annotations());
+}
+
+absl::Status Connection::DeleteAnnotation(const std::string& id) {
+  v1::DeleteAnnotationRequest request;
+  request.set_id(id);
+  return impl_
+      ->CallInSession(*impl_->annotation_, &v1::AnnotationService::Stub::Delete, std::move(request))
+      .status();
+}
+
+absl::StatusOr<std::string> Connection::Undo() {
+  auto response = impl_->CallInSession(*impl_->annotation_, &v1::AnnotationService::Stub::Undo,
+                                       v1::UndoAnnotationRequest());
+  if (!response.ok()) return response.status();
+  return response->description();
+}
+
+absl::StatusOr<std::string> Connection::Redo() {
+  auto response = impl_->CallInSession(*impl_->annotation_, &v1::AnnotationService::Stub::Redo,
+                                       v1::RedoAnnotationRequest());
+  if (!response.ok()) return response.status();
+  return response->description();
+}
+
+absl::Status Connection::Watch(const std::function<bool(const WatchEvent&)>& on_event) {
+  return impl_->Watch(on_event);
+}
+
+}  // namespace saccade::net

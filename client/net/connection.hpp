@@ -1,0 +1,85 @@
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/net/types.hpp"
+#include "shared/scene/annotation.hpp"
+
+namespace saccade::net {
+
+struct ConnectionOptions {
+  /// host:port of the server's gRPC address.
+  std::string server = "127.0.0.1:50051";
+  /// How long one call may take. A server on the same machine answers within milliseconds; a PNG
+  /// over a slow line does not.
+  std::chrono::milliseconds deadline{5000};
+  /// Who the others see; at most 60 bytes.
+  std::string display_name = "guest";
+  Role role = Role::kExpert;
+  /// A session joined earlier; empty: join when a call first needs one.
+  std::string session_id;
+
+  absl::Status Validate() const;
+};
+
+/// One server as a client sees it: every call in domain types, checked on arrival.
+///
+/// Calls block until the answer or the deadline; one thread at a time, Watch() aside. Errors keep
+/// the gRPC code and say in words what to do about it:
+///   Unavailable         nobody answers at that address
+///   DeadlineExceeded    no answer in time
+///   Unimplemented       the server is older or newer than this program
+///   anything else       as the server said
+class Connection {
+ public:
+  /// Does not touch the network: the first call does.
+  static absl::StatusOr<std::unique_ptr<Connection>> Create(const ConnectionOptions& options);
+  ~Connection();
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  /// The session that calls are made in; joins, or joins anew if the server no longer knows it.
+  absl::StatusOr<std::string> Session();
+
+  absl::StatusOr<ServerStatus> GetStatus();
+  /// The newest frame if `frame_id` is nothing.
+  absl::StatusOr<Still> GetFrame(std::optional<FrameId> frame_id, VideoView view);
+
+  absl::StatusOr<MapState> GetMap();
+  /// ASCII PLY, vertex x y z [m] red green blue sigma_m.
+  absl::StatusOr<MapExport> ExportMap();
+  /// Returns the new map generation.
+  absl::StatusOr<std::uint64_t> ResetMap();
+
+  /// `draft.request_id` is filled in if empty, so that a call made again creates nothing twice.
+  absl::StatusOr<Annotation> CreateAnnotation(AnnotationDraft draft);
+  absl::StatusOr<Annotation> UpdateAnnotation(const AnnotationPatch& patch);
+  absl::StatusOr<std::vector<Annotation>> ListAnnotations();
+  absl::Status DeleteAnnotation(const std::string& id);
+  /// What was undone or redone, in words. Acts on this session's own last change.
+  absl::StatusOr<std::string> Undo();
+  absl::StatusOr<std::string> Redo();
+
+  /// Delivers poses, annotations, statistics and presence until `on_event` returns false (OK), the
+  /// server goes away (an error) or closes the stream (OK). Acknowledges as it reads, so that what
+  /// arrives is never older than the acknowledgement window.
+  absl::Status Watch(const std::function<bool(const WatchEvent&)>& on_event);
+
+ private:
+  class Impl;
+  explicit Connection(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A random (version 4) UUID.
+std::string RandomUuid();
+
+}  // namespace saccade::net

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "shared/camera/camera_model.hpp"
+#include "shared/scene/annotation.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+namespace saccade::net {
+
+/// What a client tells the server about itself.
+enum class Role { kExpert, kWearer, kViewer };
+
+/// raw: as captured; augmented: marks burned in by the server.
+enum class VideoView { kRaw, kAugmented };
+
+struct Participant {
+  std::string session_id;
+  std::string display_name;
+  Role role = Role::kViewer;
+};
+
+/// The server's running figures, over about the last second.
+struct Statistics {
+  double captured_fps_hz = 0, tracked_fps_hz = 0, encoded_fps_hz = 0;
+  std::uint64_t frames_dropped = 0;  // by the tracker, because a newer one was there
+  std::uint64_t bad_frames = 0;      // could not be decoded
+  std::uint64_t events_skipped = 0;  // of this subscriber, because it was slow
+  double video_bit_rate_bit_s = 0;
+  double track_ms_p50 = 0, track_ms_p95 = 0;
+  double encode_ms_p50 = 0, encode_ms_p95 = 0;
+};
+
+struct ServerStatus {
+  MapSnapshot pose;  // of the newest frame, without features
+  Statistics statistics;
+  std::vector<Participant> participants;
+  std::uint32_t map_features = 0;
+  std::uint32_t annotations = 0;
+  std::string source;
+  std::string server_version;
+  double uptime_s = 0;
+  bool source_ended = false;
+};
+
+struct MapState {
+  std::uint64_t generation = 0;
+  std::uint64_t revision = 0;
+  FrameId frame_id = 0;
+  bool metric = false;
+  std::vector<FeatureSnapshot> features;
+};
+
+/// A file of the map, ready to be written.
+struct MapExport {
+  std::string data;
+  std::uint32_t feature_count = 0;
+};
+
+/// One picture with the pose it was taken from.
+struct Still {
+  FrameId frame_id = 0;
+  std::string png;
+  CameraIntrinsics intrinsics;
+  MapSnapshot pose;  // without features
+};
+
+struct AnnotationChange {
+  bool full = false;  // the first of a subscription: everything there is
+  std::vector<Annotation> upserted;
+  std::vector<std::string> removed_ids;
+};
+
+struct SourceEnd {
+  std::uint64_t frames = 0;
+};
+
+/// What Watch() delivers.
+using WatchEvent =
+    std::variant<MapSnapshot, AnnotationChange, Statistics, std::vector<Participant>, SourceEnd>;
+
+}  // namespace saccade::net

@@ -1,0 +1,106 @@
+#include "client/cli/options.hpp"
+
+#include <gtest/gtest.h>
+
+#include <initializer_list>
+#include <vector>
+
+namespace saccade::cli {
+namespace {
+
+ParseResult Parse(std::initializer_list<const char*> arguments) {
+  std::vector<const char*> argv = {"saccade"};
+  argv.insert(argv.end(), arguments);
+  return ParseCommandLine(static_cast<int>(argv.size()), argv.data());
+}
+
+TEST(CommandLine, HelpAndVersionEndWithSuccess) {
+  for (const char* argument : {"--help", "--version"}) {
+    const ParseResult result = Parse({argument});
+    EXPECT_FALSE(result.options);
+    EXPECT_EQ(result.exit_code, 0) << argument;
+  }
+}
+
+TEST(CommandLine, BadUsageEndsWithTwo) {
+  const std::vector<std::initializer_list<const char*>> wrong = {
+      {},
+      {"bogus"},
+      {"status", "extra"},
+      {"--server", "nowhere", "status"},
+      {"--server", "host:0", "status"},
+      {"--server", "host:65536", "status"},
+      {"--timeout", "0", "status"},
+      {"annotate"},
+      {"annotate", "--pixel", "1"},
+      {"annotate", "--pixel", "1,nan"},
+      {"annotate", "--pixel", "1,inf"},
+      {"annotate", "--pixel", "1,2,3"},
+      {"annotate", "--pixel", "1,2", "--feature", "3"},
+      {"annotate", "--feature", "-3"},
+      {"annotate", "--feature", "3", "--frame", "7"},
+      {"annotate", "--feature", "3", "--shape", "sphere"},
+      {"annotate", "--pixel", "1,2", "--shape", "ink"},
+      {"annotate", "--pixel", "1,2", "--stroke", "1,2,3,4"},
+      {"annotate", "--pixel", "1,2", "--size", "11"},
+      {"snapshot", "--view", "raw"},
+      {"snapshot", "--view", "rgb", "--out", "a.png"},
+      {"annotations", "show"},
+      {"annotations", "bogus"},
+      {"watch", "--for", "-1"},
+  };
+  for (const auto& arguments : wrong) {
+    const ParseResult result = Parse(arguments);
+    std::string line;
+    for (const char* argument : arguments) line += std::string(" ") + argument;
+    EXPECT_FALSE(result.options) << line;
+    EXPECT_EQ(result.exit_code, kBadUsage) << line;
+  }
+}
+
+TEST(CommandLine, TargetsOfAnAnnotationAreTaken) {
+  const ParseResult pixel = Parse({"annotate", "--pixel", "319.5,239.5", "--frame", "7"});
+  ASSERT_TRUE(pixel.options);
+  EXPECT_EQ(std::get<PixelTarget>(pixel.options->draft.target).pixel,
+            Eigen::Vector2d(319.5, 239.5));
+  EXPECT_EQ(pixel.options->frame, FrameId{7});
+  EXPECT_EQ(pixel.options->draft.shape, AnnotationShape::kCube);
+
+  const ParseResult point = Parse({"annotate", "--point=-0.1,0,2", "--shape", "arrow"});
+  ASSERT_TRUE(point.options);
+  EXPECT_EQ(std::get<PointTarget>(point.options->draft.target).point_in_world,
+            Eigen::Vector3d(-0.1, 0, 2));
+  EXPECT_EQ(point.options->draft.shape, AnnotationShape::kArrow);
+
+  const ParseResult feature =
+      Parse({"annotate", "--feature", "12", "--shape", "note", "--text", "oil here"});
+  ASSERT_TRUE(feature.options);
+  EXPECT_EQ(std::get<FeatureTarget>(feature.options->draft.target).feature_id, 12u);
+  EXPECT_EQ(feature.options->draft.text, "oil here");
+
+  const ParseResult ink =
+      Parse({"annotate", "--pixel", "1,2", "--shape", "ink", "--stroke", "1,2,3,4.5"});
+  ASSERT_TRUE(ink.options);
+  ASSERT_EQ(ink.options->draft.ink_px.size(), 2u);
+  EXPECT_EQ(ink.options->draft.ink_px[1], Eigen::Vector2d(3, 4.5));
+}
+
+TEST(CommandLine, OptionsOfTheProgramMayFollowTheCommand) {
+  const ParseResult result = Parse({"status", "--server", "wearable:6000", "--json"});
+  ASSERT_TRUE(result.options);
+  EXPECT_EQ(result.options->connection.server, "wearable:6000");
+  EXPECT_TRUE(result.options->json);
+}
+
+TEST(CommandLine, AnnotationsMeansListUnlessToldOtherwise) {
+  EXPECT_EQ(Parse({"annotations"}).options->command, Command::kListAnnotations);
+  EXPECT_EQ(Parse({"annotations", "list"}).options->command, Command::kListAnnotations);
+  EXPECT_EQ(Parse({"annotations", "undo"}).options->command, Command::kUndo);
+  const ParseResult show = Parse({"annotations", "show", "6f1c"});
+  ASSERT_TRUE(show.options);
+  EXPECT_EQ(show.options->command, Command::kShowAnnotation);
+  EXPECT_EQ(show.options->id, "6f1c");
+}
+
+}  // namespace
+}  // namespace saccade::cli
