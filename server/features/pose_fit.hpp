@@ -16,7 +16,7 @@ struct PoseFitOptions {
   double sigma_px = 0.5;  // measurement noise, each axis
   double huber_px = 2.0;  // residuals beyond count linearly
   int max_iterations = 30;
-  /// A prior on the pose, used if both are above zero (start.yaml).
+  /// How well `initial` is known; 0: not at all (no prior).
   double prior_position_sigma_m = 0.0;
   double prior_orientation_sigma_rad = 0.0;
 };

@@ -24,6 +24,8 @@ struct TargetObservation {
   Rigid3 world_from_camera;
   Matrix6d pose_covariance = Matrix6d::Zero();  // [position m, local rotation rad]
   double rms_px = 0.0;
+  /// A second pose explains the picture nearly as well (planar ambiguity, error ratio below 2).
+  bool ambiguous = false;
 };
 
 /// Finds the inner corners of `target`'s chessboard and the camera's pose.
@@ -31,7 +33,7 @@ struct TargetObservation {
 /// The board looks the same after half a turn. Which corner is (0, 0) is decided by `predicted`
 /// (world_from_camera, if known), else by target.hint_px, else corner (0, 0) is the one more up and
 /// left. NotFound: no whole board in view. FailedPrecondition: corners do not fit a plane seen by
-/// this camera (rms above 2 px). Costs 5 to 30 ms: meant for the start.
+/// this camera (rms above 2 px). Meant for the start; times in README.md.
 absl::StatusOr<TargetObservation> DetectChessboard(const ImagePyramid& pyramid,
                                                    const CameraModel& camera,
                                                    const ChessboardTarget& target,
