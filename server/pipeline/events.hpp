@@ -36,6 +36,7 @@ inline constexpr int kVideoViews = 2;
 /// One coded picture with the pose it was taken from.
 struct VideoPacket {
   VideoView view = VideoView::kRaw;
+  std::uint64_t sequence = 0;  // of this view, rises by one: a gap means a lost reference
   bool key_frame = false;
   int temporal_layer = 0;                   // 0, 1, 2
   std::shared_ptr<const std::string> data;  // one access unit, H.264 Annex B

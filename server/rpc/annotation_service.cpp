@@ -1,0 +1,169 @@
+#include "server/rpc/annotation_service.hpp"
+
+#include "server/rpc/status.hpp"
+#include "shared/wire/from_proto.hpp"
+#include "shared/wire/to_proto.hpp"
+
+namespace saccade {
+namespace {
+
+grpc::ServerUnaryReactor* Refuse(grpc::ServerUnaryReactor* reactor, const char* method,
+                                 const std::string& session_id, const absl::Status& status) {
+  Audit(method, session_id, status);
+  reactor->Finish(ToGrpc(status));
+  return reactor;
+}
+
+wire::ImageSize ImageOf(const Backend& backend) {
+  return {backend.facts().camera->width(), backend.facts().camera->height()};
+}
+
+absl::StatusOr<AnnotationPatch> PatchFromProto(const v1::UpdateAnnotationRequest& request,
+                                               const wire::ImageSize& image) {
+  AnnotationPatch patch;
+  if (absl::Status id = wire::CheckUuid(request.id(), "id"); !id.ok()) return id;
+  patch.id = request.id();
+  if (request.has_text()) {
+    absl::Status text = wire::CheckText(request.text(), wire::kMaxTextBytes, "text");
+    if (!text.ok()) return text;
+    patch.text = request.text();
+  }
+  if (request.has_size_m()) {
+    const absl::StatusOr<double> size_m = wire::CheckSize(request.size_m(), "size_m");
+    if (!size_m.ok()) return size_m.status();
+    patch.size_m = *size_m;
+  }
+  if (request.has_color_rgba()) patch.color_rgba = request.color_rgba();
+  if (request.has_target()) {
+    absl::StatusOr<AnnotationTarget> target = wire::FromProto(request.target(), image, "target");
+    if (!target.ok()) return target.status();
+    patch.target = *std::move(target);
+  }
+  return patch;
+}
+
+}  // namespace
+
+void AnnotationService::Submit(grpc::ServerUnaryReactor* reactor, const char* method,
+                               const std::string& session_id, Command command) {
+  // Never blocks: the tracker thread resolves the anchor, the store commits, then `done` finishes.
+  const absl::Status queued = backend_.Submit(std::move(command));
+  if (!queued.ok()) Refuse(reactor, method, session_id, queued);
+}
+
+template <typename Response>
+Done<Annotation> AnnotationService::Answer(grpc::ServerUnaryReactor* reactor, Response* response,
+                                           const char* method, const std::string& session_id) {
+  return
+      [this, reactor, response, method, session_id](const absl::StatusOr<Annotation>& annotation) {
+        if (annotation.ok()) {
+          const std::optional<TrackedEvent> newest = hub_.newest();
+          *response->mutable_annotation() = newest ? AnnotationToProto(*annotation, *newest)
+                                                   : wire::ToProto(*annotation, std::nullopt);
+        }
+        Audit(method, session_id, annotation.status());
+        reactor->Finish(ToGrpc(annotation.status()));
+      };
+}
+
+grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext* context,
+                                                    const v1::CreateAnnotationRequest* request,
+                                                    v1::CreateAnnotationResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  if (!session.ok()) return Refuse(reactor, "Create", "", session.status());
+  if (!request->request_id().empty()) {
+    absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
+    if (!uuid.ok()) return Refuse(reactor, "Create", session->id, uuid);
+  }
+  absl::StatusOr<AnnotationDraft> draft = wire::FromProto(request->draft(), ImageOf(backend_));
+  if (!draft.ok()) return Refuse(reactor, "Create", session->id, draft.status());
+  draft->request_id = request->request_id();
+  draft->author = session->display_name;
+  Submit(reactor, "Create", session->id,
+         CreateAnnotation{session->id, *std::move(draft),
+                          Answer(reactor, response, "Create", session->id)});
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext* context,
+                                                    const v1::UpdateAnnotationRequest* request,
+                                                    v1::UpdateAnnotationResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  if (!session.ok()) return Refuse(reactor, "Update", "", session.status());
+  absl::StatusOr<AnnotationPatch> patch = PatchFromProto(*request, ImageOf(backend_));
+  if (!patch.ok()) return Refuse(reactor, "Update", session->id, patch.status());
+  Submit(reactor, "Update", session->id,
+         UpdateAnnotation{session->id, *std::move(patch),
+                          Answer(reactor, response, "Update", session->id)});
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext* context,
+                                                    const v1::DeleteAnnotationRequest* request,
+                                                    v1::DeleteAnnotationResponse* /*response*/) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  if (!session.ok()) return Refuse(reactor, "Delete", "", session.status());
+  if (absl::Status uuid = wire::CheckUuid(request->id(), "id"); !uuid.ok()) {
+    return Refuse(reactor, "Delete", session->id, uuid);
+  }
+  Submit(reactor, "Delete", session->id,
+         DeleteAnnotation{session->id, request->id(),
+                          [reactor, id = session->id](const absl::Status& status) {
+                            Audit("Delete", id, status);
+                            reactor->Finish(ToGrpc(status));
+                          }});
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* context,
+                                                  const v1::ListAnnotationsRequest* /*request*/,
+                                                  v1::ListAnnotationsResponse* response) {
+  if (const std::optional<TrackedEvent> newest = hub_.newest()) {
+    for (const Annotation& annotation : *newest->annotations) {
+      *response->add_annotations() = AnnotationToProto(annotation, *newest);
+    }
+  }
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
+template <typename Response>
+void AnnotationService::TakeBack(grpc::ServerUnaryReactor* reactor, const std::string& session_id,
+                                 bool redo, Response* response) {
+  const char* method = redo ? "Redo" : "Undo";
+  const absl::StatusOr<Session> session = sessions_.FindEditor(session_id);
+  if (!session.ok()) {
+    Refuse(reactor, method, "", session.status());
+    return;
+  }
+  Submit(reactor, method, session->id,
+         UndoChange{session->id, redo,
+                    [reactor, response, method,
+                     id = session->id](const absl::StatusOr<std::string>& description) {
+                      if (description.ok()) response->set_description(*description);
+                      Audit(method, id, description.status());
+                      reactor->Finish(ToGrpc(description.status()));
+                    }});
+}
+
+grpc::ServerUnaryReactor* AnnotationService::Undo(grpc::CallbackServerContext* context,
+                                                  const v1::UndoAnnotationRequest* request,
+                                                  v1::UndoAnnotationResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  TakeBack(reactor, request->session_id(), false, response);
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* AnnotationService::Redo(grpc::CallbackServerContext* context,
+                                                  const v1::RedoAnnotationRequest* request,
+                                                  v1::RedoAnnotationResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  TakeBack(reactor, request->session_id(), true, response);
+  return reactor;
+}
+
+}  // namespace saccade

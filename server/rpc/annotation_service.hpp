@@ -1,0 +1,51 @@
+#pragma once
+
+#include "saccade/v1/annotation.grpc.pb.h"
+#include "server/rpc/backend.hpp"
+#include "server/rpc/session_table.hpp"
+#include "server/rpc/stream_hub.hpp"
+
+namespace saccade {
+
+/// Placing, changing and removing annotations: check, submit to the tracker thread, answer after
+/// the store's commit. Handlers run on gRPC's threads and never block.
+class AnnotationService final : public v1::AnnotationService::CallbackService {
+ public:
+  AnnotationService(Backend& backend, StreamHub& hub, SessionTable& sessions)
+      : backend_(backend), hub_(hub), sessions_(sessions) {}
+
+ private:
+  grpc::ServerUnaryReactor* Create(grpc::CallbackServerContext* context,
+                                   const v1::CreateAnnotationRequest* request,
+                                   v1::CreateAnnotationResponse* response) override;
+  grpc::ServerUnaryReactor* Update(grpc::CallbackServerContext* context,
+                                   const v1::UpdateAnnotationRequest* request,
+                                   v1::UpdateAnnotationResponse* response) override;
+  grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context,
+                                   const v1::DeleteAnnotationRequest* request,
+                                   v1::DeleteAnnotationResponse* response) override;
+  grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context,
+                                 const v1::ListAnnotationsRequest* request,
+                                 v1::ListAnnotationsResponse* response) override;
+  grpc::ServerUnaryReactor* Undo(grpc::CallbackServerContext* context,
+                                 const v1::UndoAnnotationRequest* request,
+                                 v1::UndoAnnotationResponse* response) override;
+  grpc::ServerUnaryReactor* Redo(grpc::CallbackServerContext* context,
+                                 const v1::RedoAnnotationRequest* request,
+                                 v1::RedoAnnotationResponse* response) override;
+
+  template <typename Response>
+  Done<Annotation> Answer(grpc::ServerUnaryReactor* reactor, Response* response, const char* method,
+                          const std::string& session_id);
+  template <typename Response>
+  void TakeBack(grpc::ServerUnaryReactor* reactor, const std::string& session_id, bool redo,
+                Response* response);
+  void Submit(grpc::ServerUnaryReactor* reactor, const char* method, const std::string& session_id,
+              Command command);
+
+  Backend& backend_;
+  StreamHub& hub_;
+  SessionTable& sessions_;
+};
+
+}  // namespace saccade

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/pipeline/commands.hpp"
+#include "server/pipeline/events.hpp"
+
+namespace saccade {
+
+/// Facts that do not change while the server runs.
+struct ServerFacts {
+  std::string version;
+  std::string source;                         // URI
+  std::shared_ptr<const CameraModel> camera;  // never null
+};
+
+/// A picture out of the frame ring with what was known after it.
+struct Still {
+  std::shared_ptr<const std::string> png;
+  TrackedEvent tracked;
+};
+
+/// What the services need of the rest of the server. Thread safe; nothing blocks.
+class Backend : public CommandPort {
+ public:
+  virtual const ServerFacts& facts() const = 0;
+  /// Encodes on another thread. `frame_id` absent: newest. Errors go to `done`:
+  ///   NotFound           no longer, or not yet, in the ring
+  ///   ResourceExhausted  too many stills are being made
+  virtual void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) = 0;
+  /// Whether anybody watches; nothing is coded for nobody.
+  virtual void SetVideoDemand(VideoView view, bool wanted) = 0;
+  /// The next picture of `view` will be a key frame. Requests are coalesced.
+  virtual void RequestKeyFrame(VideoView view) = 0;
+};
+
+}  // namespace saccade

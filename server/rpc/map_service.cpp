@@ -1,0 +1,96 @@
+#include "server/rpc/map_service.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+
+#include "server/rpc/deltas.hpp"
+#include "server/rpc/status.hpp"
+
+namespace saccade {
+namespace {
+
+// Davison's colours: red measured, blue failed, yellow not attempted.
+const char* ColourOf(FeatureState state) {
+  switch (state) {
+    case FeatureState::kMeasured:
+      return "255 0 0";
+    case FeatureState::kFailed:
+      return "0 0 255";
+    case FeatureState::kNotAttempted:
+      return "255 255 0";
+  }
+  return "255 255 255";
+}
+
+std::string ToPly(const MapSnapshot& snapshot) {
+  std::string ply = absl::StrCat(
+      "ply\nformat ascii 1.0\ncomment saccade map, world frame, metres",
+      snapshot.metric ? "" : " (scale arbitrary)", "\nelement vertex ", snapshot.features.size(),
+      "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\n"
+      "property uchar green\nproperty uchar blue\nproperty double sigma_m\nend_header\n");
+  for (const FeatureSnapshot& feature : snapshot.features) {
+    const Eigen::Vector3d& p = feature.point_in_world;
+    const double sigma_m = std::sqrt(std::max(0.0, feature.covariance_in_world.trace()));
+    absl::StrAppend(&ply, p.x(), " ", p.y(), " ", p.z(), " ", ColourOf(feature.state), " ", sigma_m,
+                    "\n");
+  }
+  return ply;
+}
+
+absl::Status NoMapYet() {
+  return absl::FailedPreconditionError("no frame has been tracked yet: try again shortly");
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
+                                          const v1::GetMapRequest* /*request*/,
+                                          v1::GetMapResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const std::optional<TrackedEvent> newest = hub_.newest();
+  if (newest) {
+    *response->mutable_map() = FullMap(*newest->snapshot);
+    response->set_metric(newest->snapshot->metric);
+  }
+  reactor->Finish(ToGrpc(newest ? absl::OkStatus() : NoMapYet()));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context,
+                                            const v1::ResetMapRequest* /*request*/,
+                                            v1::ResetMapResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::Status queued = backend_.Submit(
+      ResetMap{[reactor, response](const absl::StatusOr<std::uint64_t>& generation) {
+        if (generation.ok()) response->set_map_generation(*generation);
+        Audit("Map.Reset", "", generation.status());
+        reactor->Finish(ToGrpc(generation.status()));
+      }});
+  if (!queued.ok()) {
+    Audit("Map.Reset", "", queued);
+    reactor->Finish(ToGrpc(queued));
+  }
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* context,
+                                             const v1::ExportMapRequest* request,
+                                             v1::ExportMapResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const std::optional<TrackedEvent> newest = hub_.newest();
+  absl::Status status = newest ? absl::OkStatus() : NoMapYet();
+  if (request->format() != v1::ExportMapRequest::FORMAT_PLY &&
+      request->format() != v1::ExportMapRequest::FORMAT_UNSPECIFIED) {
+    status = absl::InvalidArgumentError(
+        absl::StrCat("format: unknown format ", static_cast<int>(request->format())));
+  }
+  if (status.ok()) {
+    response->set_data(ToPly(*newest->snapshot));
+    response->set_feature_count(static_cast<std::uint32_t>(newest->snapshot->features.size()));
+  }
+  reactor->Finish(ToGrpc(status));
+  return reactor;
+}
+
+}  // namespace saccade

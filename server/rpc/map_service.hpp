@@ -1,0 +1,29 @@
+#pragma once
+
+#include "saccade/v1/map.grpc.pb.h"
+#include "server/rpc/backend.hpp"
+#include "server/rpc/stream_hub.hpp"
+
+namespace saccade {
+
+/// The map at large. Save, Load and List answer UNIMPLEMENTED. Handlers never block.
+class MapService final : public v1::MapService::CallbackService {
+ public:
+  MapService(Backend& backend, StreamHub& hub) : backend_(backend), hub_(hub) {}
+
+ private:
+  grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context,
+                                const v1::GetMapRequest* request,
+                                v1::GetMapResponse* response) override;
+  grpc::ServerUnaryReactor* Reset(grpc::CallbackServerContext* context,
+                                  const v1::ResetMapRequest* request,
+                                  v1::ResetMapResponse* response) override;
+  grpc::ServerUnaryReactor* Export(grpc::CallbackServerContext* context,
+                                   const v1::ExportMapRequest* request,
+                                   v1::ExportMapResponse* response) override;
+
+  Backend& backend_;
+  StreamHub& hub_;
+};
+
+}  // namespace saccade

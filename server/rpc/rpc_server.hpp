@@ -1,0 +1,51 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "server/rpc/backend.hpp"
+#include "server/rpc/stream_hub.hpp"
+
+namespace grpc {
+class Channel;
+}
+
+namespace saccade {
+
+struct RpcServerOptions {
+  std::string host = "127.0.0.1";
+  int port = 50051;  // 0: any free one, see RpcServer::port
+  /// A stroke of 2000 points is 50 KB. Larger requests: RESOURCE_EXHAUSTED, unparsed.
+  int max_request_bytes = 256 * 1024;
+  std::size_t max_sessions = 1000;
+  /// A peer that answers no ping for so long is gone, even if its socket never says so.
+  std::chrono::milliseconds keepalive_time{10'000};
+  std::chrono::milliseconds keepalive_timeout{20'000};
+};
+
+/// The gRPC server: every service of saccade.v1, health and reflection, without TLS.
+class RpcServer {
+ public:
+  /// Binds and serves. `backend` and `hub` (connected to it) outlive the server.
+  /// Unavailable: the address cannot be bound, naming it.
+  static absl::StatusOr<std::unique_ptr<RpcServer>> Start(const RpcServerOptions& options,
+                                                          Backend& backend, StreamHub& hub);
+  ~RpcServer();
+
+  int port() const;
+  /// For the gateway: calls that do not pass a socket. Only while the server runs.
+  std::shared_ptr<grpc::Channel> InProcessChannel();
+
+  /// Ends the streams, lets calls finish for `grace`, then cancels them. May be called twice.
+  void Stop(std::chrono::milliseconds grace);
+
+ private:
+  class Impl;
+  explicit RpcServer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace saccade

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+
+#include "saccade/v1/session.grpc.pb.h"
+#include "server/rpc/backend.hpp"
+#include "server/rpc/session_table.hpp"
+#include "server/rpc/stream_hub.hpp"
+
+namespace saccade {
+
+/// Joining, the stream, stills, clock. Handlers run on gRPC's threads and never block.
+class SessionService final : public v1::SessionService::CallbackService {
+ public:
+  SessionService(Backend& backend, StreamHub& hub, SessionTable& sessions);
+
+ private:
+  grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context,
+                                 const v1::JoinRequest* request,
+                                 v1::JoinResponse* response) override;
+  grpc::ServerWriteReactor<v1::Event>* Subscribe(grpc::CallbackServerContext* context,
+                                                 const v1::SubscribeRequest* request) override;
+  grpc::ServerUnaryReactor* Acknowledge(grpc::CallbackServerContext* context,
+                                        const v1::AcknowledgeRequest* request,
+                                        v1::AcknowledgeResponse* response) override;
+  grpc::ServerUnaryReactor* Ping(grpc::CallbackServerContext* context,
+                                 const v1::PingRequest* request,
+                                 v1::PingResponse* response) override;
+  grpc::ServerUnaryReactor* GetFrame(grpc::CallbackServerContext* context,
+                                     const v1::GetFrameRequest* request,
+                                     v1::GetFrameResponse* response) override;
+  grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
+                                      const v1::GetStatusRequest* request,
+                                      v1::GetStatusResponse* response) override;
+
+  Backend& backend_;
+  StreamHub& hub_;
+  SessionTable& sessions_;
+  const Timestamp started_ns_;
+};
+
+}  // namespace saccade

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <absl/container/flat_hash_map.h>
+#include <absl/status/statusor.h>
+
+#include <cstddef>
+#include <mutex>
+#include <string>
+
+#include "saccade/v1/session.pb.h"
+#include "shared/time/timestamp.hpp"
+
+namespace saccade {
+
+struct Session {
+  std::string id;  // UUID
+  std::string display_name;
+  v1::Role role = v1::ROLE_EXPERT;
+};
+
+/// Who joined. Bounded: above `max_sessions` the one unused for longest goes. Thread safe.
+class SessionTable {
+ public:
+  explicit SessionTable(std::size_t max_sessions = 1000) : max_sessions_(max_sessions) {}
+
+  /// InvalidArgument names the field.
+  absl::StatusOr<Session> Join(const v1::JoinRequest& request);
+
+  /// NotFound: never joined, or before this server started. Counts as use.
+  absl::StatusOr<Session> Find(const std::string& session_id);
+
+  /// As Find; PermissionDenied for those who may only look.
+  absl::StatusOr<Session> FindEditor(const std::string& session_id);
+
+ private:
+  struct Slot {
+    Session session;
+    Timestamp used_ns = 0;
+  };
+  void MakeRoom();
+
+  const std::size_t max_sessions_;
+  std::mutex mutex_;
+  absl::flat_hash_map<std::string, Slot> sessions_;
+};
+
+}  // namespace saccade

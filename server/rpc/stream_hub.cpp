@@ -1,0 +1,182 @@
+#include "server/rpc/stream_hub.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace saccade {
+namespace {
+
+// Messages that may wait for the hub's thread: two seconds of everything. A video packet that falls
+// out is noticed by its sequence number and costs a key frame.
+constexpr std::size_t kBacklog = 256;
+
+}  // namespace
+
+StreamHub::StreamHub()
+    : presence_(std::make_shared<v1::PresenceEvent>()),
+      runner_({.capacity = kBacklog, .when_full = WhenFull::kDropOldest},
+              [this](const Message& message) { Distribute(message); }) {}
+
+StreamHub::~StreamHub() { runner_.Stop(); }
+
+void StreamHub::OnTracked(const TrackedEvent& event) {
+  {
+    const std::lock_guard lock(mutex_);
+    newest_ = event;
+  }
+  runner_.Post(event).IgnoreError();  // stopped: nobody is left to hear it
+}
+
+void StreamHub::OnVideo(const std::shared_ptr<const VideoPacket>& packet) {
+  runner_.Post(packet).IgnoreError();
+}
+
+void StreamHub::OnStatistics(const EngineStatistics& statistics) {
+  {
+    const std::lock_guard lock(mutex_);
+    statistics_ = statistics;
+  }
+  runner_.Post(statistics).IgnoreError();
+}
+
+void StreamHub::OnEndOfSource(std::uint64_t frames) {
+  {
+    const std::lock_guard lock(mutex_);
+    end_frames_ = frames;
+  }
+  runner_.Post(EndOfSource{frames}).IgnoreError();
+}
+
+void StreamHub::Distribute(const Message& message) {
+  const std::shared_ptr<const v1::PresenceEvent> present = presence();
+  for (const std::shared_ptr<Subscriber>& stream : Streams()) {
+    stream->Update([&](Subscription& subscription) {
+      if (const auto* tracked = std::get_if<TrackedEvent>(&message)) {
+        subscription.Offer(*tracked);
+      } else if (const auto* packet = std::get_if<std::shared_ptr<const VideoPacket>>(&message)) {
+        subscription.Offer(*packet);
+      } else if (const auto* statistics = std::get_if<EngineStatistics>(&message)) {
+        subscription.Offer(*statistics);
+      } else if (const auto* end = std::get_if<EndOfSource>(&message)) {
+        subscription.OfferEnd(end->frames);
+      } else {
+        subscription.OfferPresence(present);
+      }
+    });
+  }
+}
+
+void StreamHub::Add(const std::shared_ptr<Subscriber>& subscriber) {
+  std::shared_ptr<Subscriber> replaced;
+  bool closed = false;
+  {
+    const std::lock_guard lock(mutex_);
+    closed = closed_;
+    if (!closed_) {
+      const auto same = std::find_if(streams_.begin(), streams_.end(), [&](const auto& other) {
+        return other->session().id == subscriber->session().id;
+      });
+      if (same != streams_.end()) {
+        replaced = *same;
+        streams_.erase(same);
+      }
+      streams_.push_back(subscriber);
+    }
+  }
+  if (replaced != nullptr) {
+    replaced->Close(absl::AbortedError("session_id: this session opened another stream"));
+  }
+  if (closed) return subscriber->Close(absl::UnavailableError("the server is shutting down"));
+  const std::optional<TrackedEvent> tracked = newest();
+  const std::optional<std::uint64_t> end = end_of_source();
+  StreamsChanged();
+  const std::shared_ptr<const v1::PresenceEvent> present = presence();
+  subscriber->Update([&](Subscription& subscription) {
+    if (tracked) subscription.Offer(*tracked);
+    if (end) subscription.OfferEnd(*end);
+    subscription.OfferPresence(present);
+  });
+}
+
+void StreamHub::Remove(const Subscriber* subscriber) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::erase_if(streams_,
+                      [subscriber](const auto& one) { return one.get() == subscriber; }) == 0) {
+      return;
+    }
+  }
+  StreamsChanged();
+}
+
+// Who is there changed: tell the others, and the encoder whether anybody watches.
+void StreamHub::StreamsChanged() {
+  auto presence = std::make_shared<v1::PresenceEvent>();
+  std::array<bool, kVideoViews> wanted{};
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& stream : streams_) {
+      v1::Participant& participant = *presence->add_participants();
+      participant.set_session_id(stream->session().id);
+      participant.set_display_name(stream->session().display_name);
+      participant.set_role(stream->session().role);
+      if (stream->wants_video()) wanted[static_cast<std::size_t>(stream->view())] = true;
+    }
+    presence_ = presence;
+    for (int view = 0; view < kVideoViews; ++view) {
+      backend_->SetVideoDemand(static_cast<VideoView>(view),
+                               wanted[static_cast<std::size_t>(view)]);
+    }
+  }
+  runner_.Post(PresenceChanged{}).IgnoreError();
+}
+
+absl::Status StreamHub::Acknowledge(const std::string& session_id, std::uint64_t sequence,
+                                    bool request_key_frame) {
+  for (const std::shared_ptr<Subscriber>& stream : Streams()) {
+    if (stream->session().id != session_id) continue;
+    absl::Status result;
+    stream->Update([&](Subscription& subscription) {
+      result = subscription.Acknowledge(sequence, request_key_frame);
+    });
+    return result;
+  }
+  return absl::NotFoundError("session_id: this session has no stream: call Subscribe");
+}
+
+void StreamHub::CloseAll(const absl::Status& status) {
+  std::vector<std::shared_ptr<Subscriber>> streams;
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    streams.swap(streams_);
+  }
+  for (const auto& stream : streams) stream->Close(status);
+}
+
+std::vector<std::shared_ptr<Subscriber>> StreamHub::Streams() const {
+  const std::lock_guard lock(mutex_);
+  return streams_;
+}
+
+std::optional<TrackedEvent> StreamHub::newest() const {
+  const std::lock_guard lock(mutex_);
+  return newest_;
+}
+
+EngineStatistics StreamHub::statistics() const {
+  const std::lock_guard lock(mutex_);
+  return statistics_;
+}
+
+std::shared_ptr<const v1::PresenceEvent> StreamHub::presence() const {
+  const std::lock_guard lock(mutex_);
+  return presence_;
+}
+
+std::optional<std::uint64_t> StreamHub::end_of_source() const {
+  const std::lock_guard lock(mutex_);
+  return end_frames_;
+}
+
+}  // namespace saccade

@@ -1,0 +1,108 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/pipeline/events.hpp"
+#include "server/pipeline/runner.hpp"
+#include "server/rpc/backend.hpp"
+#include "server/rpc/session_table.hpp"
+#include "server/rpc/subscription.hpp"
+
+namespace saccade {
+
+/// One open stream: a Subscription, its lock, and something that writes.
+class Subscriber {
+ public:
+  Subscriber(Session session, const SubscriptionOptions& options)
+      : session_(std::move(session)), subscription_(options) {}
+  virtual ~Subscriber() = default;
+
+  const Session& session() const { return session_; }
+  VideoView view() const { return subscription_.options().view; }
+  bool wants_video() const {
+    return subscription_.options().topics.test(static_cast<std::size_t>(v1::TOPIC_VIDEO));
+  }
+
+  /// Runs `change` on the subscription under its lock, then writes what has become due.
+  template <typename Change>
+  void Update(Change change) {
+    {
+      const std::lock_guard lock(mutex_);
+      change(subscription_);
+    }
+    Pump();
+  }
+
+  /// Starts a write if none is under way and something is due. Never blocks.
+  virtual void Pump() = 0;
+  /// Ends the stream with `status`.
+  virtual void Close(const absl::Status& status) = 0;
+
+ protected:
+  const Session session_;
+  std::mutex mutex_;
+  Subscription subscription_;
+};
+
+/// Hands what the engine publishes to every open stream. Publishing only queues: one thread of the
+/// hub's own offers to the streams, so neither tracker nor encoder ever waits for a client.
+class StreamHub : public EventSink {
+ public:
+  StreamHub();
+  ~StreamHub() override;
+
+  /// Where key frames are asked for. Before the first Add; `backend` outlives the hub's streams.
+  void Connect(Backend* backend) { backend_ = backend; }
+  Backend* backend() const { return backend_; }
+
+  void OnTracked(const TrackedEvent& event) override;
+  void OnVideo(const std::shared_ptr<const VideoPacket>& packet) override;
+  void OnStatistics(const EngineStatistics& statistics) override;
+  void OnEndOfSource(std::uint64_t frames) override;
+
+  /// Opens a stream; one that the same session had is closed (Aborted).
+  void Add(const std::shared_ptr<Subscriber>& subscriber);
+  void Remove(const Subscriber* subscriber);
+  /// NotFound: the session has no stream.
+  absl::Status Acknowledge(const std::string& session_id, std::uint64_t sequence,
+                           bool request_key_frame);
+  /// Ends every stream and takes no more.
+  void CloseAll(const absl::Status& status);
+
+  /// Nothing before the first frame.
+  std::optional<TrackedEvent> newest() const;
+  EngineStatistics statistics() const;
+  std::shared_ptr<const v1::PresenceEvent> presence() const;
+  std::optional<std::uint64_t> end_of_source() const;
+
+ private:
+  struct PresenceChanged {};
+  struct EndOfSource {
+    std::uint64_t frames;
+  };
+  using Message = std::variant<TrackedEvent, std::shared_ptr<const VideoPacket>, EngineStatistics,
+                               EndOfSource, PresenceChanged>;
+
+  void Distribute(const Message& message);
+  std::vector<std::shared_ptr<Subscriber>> Streams() const;
+  void StreamsChanged();
+
+  Backend* backend_ = nullptr;
+  mutable std::mutex mutex_;
+  std::vector<std::shared_ptr<Subscriber>> streams_;
+  bool closed_ = false;
+  std::optional<TrackedEvent> newest_;
+  EngineStatistics statistics_;
+  std::shared_ptr<const v1::PresenceEvent> presence_;
+  std::optional<std::uint64_t> end_frames_;
+  Runner<Message> runner_;  // last: its thread uses everything above
+};
+
+}  // namespace saccade

@@ -1,0 +1,76 @@
+#include "server/rpc/stream_writer.hpp"
+
+#include "server/rpc/status.hpp"
+
+namespace saccade {
+
+StreamWriter* StreamWriter::Open(StreamHub& hub, Session session,
+                                 const SubscriptionOptions& options) {
+  auto* writer = new StreamWriter(hub, std::move(session), options);
+  writer->self_.reset(writer);
+  hub.Add(writer->self_);
+  return writer;
+}
+
+void StreamWriter::Pump() {
+  bool write = false;
+  bool ask = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (writing_ || finished_ || closing_) return;
+    const Timestamp now_ns = MonotonicNow();
+    write = writing_ = subscription_.Next(now_ns, event_);
+    ask = subscription_.WantsKeyFrame(now_ns);
+  }
+  // Outside the lock: gRPC may run OnWriteDone before StartWrite returns. Nothing else touches
+  // event_ or finishes the call while writing_ is set.
+  if (write) StartWrite(&event_);
+  if (ask) hub_.backend()->RequestKeyFrame(view());
+}
+
+void StreamWriter::Close(const absl::Status& status) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (finished_ || closing_) return;
+    if (writing_) {
+      closing_ = status;
+      return;
+    }
+    finished_ = true;
+  }
+  Finish(ToGrpc(status));
+}
+
+void StreamWriter::OnWriteDone(bool ok) {
+  std::optional<absl::Status> finish;
+  {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    if (finished_) return;
+    if (closing_) {
+      finish = closing_;
+    } else if (!ok) {
+      finish = absl::CancelledError("the client has gone");
+    }
+    finished_ = finish.has_value();
+  }
+  if (finish) {
+    Finish(ToGrpc(*finish));
+  } else {
+    Pump();
+  }
+}
+
+void StreamWriter::OnCancel() {
+  hub_.Remove(this);
+  Close(absl::CancelledError("the client has gone"));
+}
+
+void StreamWriter::OnDone() {
+  hub_.Remove(this);
+  Audit("Subscribe/end", session_.id, absl::OkStatus());
+  // The hub may still hold a reference for the length of one Distribute.
+  const std::shared_ptr<StreamWriter> last = std::move(self_);
+}
+
+}  // namespace saccade

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "saccade/v1/session.pb.h"
+#include "server/pipeline/events.hpp"
+#include "server/rpc/deltas.hpp"
+#include "server/rpc/video_queue.hpp"
+
+namespace saccade {
+
+/// What a subscriber asked for, checked.
+struct SubscriptionOptions {
+  std::bitset<8> topics;  // by v1::Topic
+  VideoView view = VideoView::kRaw;
+  std::uint32_t window = 32;  // events in flight unacknowledged
+
+  /// InvalidArgument names the field.
+  static absl::StatusOr<SubscriptionOptions> FromProto(const v1::SubscribeRequest& request);
+};
+
+/// The bounded state of one stream: the newest of everything, and which of it was sent.
+///
+/// Offers only overwrite; Next decides what goes out. So a subscriber costs a few pointers however
+/// slow it is, and what it gets late is the newest, not a backlog. Knows nothing of gRPC; not
+/// thread safe.
+class Subscription {
+ public:
+  explicit Subscription(const SubscriptionOptions& options) : options_(options) {}
+
+  void Offer(const TrackedEvent& event);
+  void Offer(const std::shared_ptr<const VideoPacket>& packet);
+  void Offer(const EngineStatistics& statistics);
+  void OfferPresence(std::shared_ptr<const v1::PresenceEvent> presence);
+  void OfferEnd(std::uint64_t frames) { end_frames_ = frames; }
+
+  /// InvalidArgument: `sequence` was never sent.
+  absl::Status Acknowledge(std::uint64_t sequence, bool request_key_frame);
+
+  /// Fills the next event, if there is one and the window allows it. Kinds take turns, so that
+  /// video cannot starve the map; a new subscriber has annotations and map before any picture.
+  bool Next(Timestamp now_ns, v1::Event& event);
+
+  /// True if the encoder should be asked for a key frame now (only while events may be sent).
+  bool WantsKeyFrame(Timestamp now_ns);
+
+  const SubscriptionOptions& options() const { return options_; }
+  std::uint64_t last_sequence() const { return sequence_; }
+
+ private:
+  enum Kind { kAnnotations, kMap, kPresence, kGaze, kPose, kVideo, kStatistics, kEnd, kKinds };
+
+  bool Has(v1::Topic topic) const { return options_.topics.test(static_cast<std::size_t>(topic)); }
+  bool WindowOpen() const { return sequence_ - acknowledged_ < options_.window; }
+  bool Fill(Kind kind, Timestamp now_ns, v1::Event& event);
+  bool FillVideo(Timestamp now_ns, v1::Event& event);
+  bool FillPose(v1::Event& event);
+  bool FillStatistics(v1::Event& event);
+
+  const SubscriptionOptions options_;
+  std::uint64_t sequence_ = 0;
+  std::uint64_t acknowledged_ = 0;
+  int last_kind_ = kKinds - 1;
+
+  std::optional<TrackedEvent> tracked_;  // the newest
+  // Whether `tracked_` is yet to be looked at, by kind.
+  bool pose_due_ = false, map_due_ = false, annotations_due_ = false;
+  bool gaze_due_ = true;
+  MapDeltaTracker map_;
+  AnnotationDeltaTracker annotations_;
+  VideoQueue video_;
+  std::shared_ptr<const v1::PresenceEvent> presence_;
+  std::optional<EngineStatistics> statistics_;
+  std::optional<std::uint64_t> end_frames_;
+  std::uint64_t poses_skipped_ = 0;
+};
+
+v1::StatisticsEvent StatisticsToProto(const EngineStatistics& statistics,
+                                      std::uint64_t events_skipped);
+
+}  // namespace saccade
