@@ -1,0 +1,60 @@
+#include "server/eval/run.hpp"
+
+#include <absl/strings/str_format.h>
+#include <time.h>
+
+#include <iostream>
+
+#include "server/eval/run_recorder.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr Timestamp kProgressEvery_ns = 10'000'000'000;
+
+}  // namespace
+
+double ThreadCpuMs() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const TrackFunction& track,
+                                                  const Trajectory& truth,
+                                                  const std::filesystem::path& folder) {
+  absl::StatusOr<RunRecorder> recorder = RunRecorder::Create(folder);
+  if (!recorder.ok()) return recorder.status();
+  Timestamp told = MonotonicNow();
+  bool metric = false;
+  while (true) {
+    absl::StatusOr<std::optional<Frame>> frame = source.Next();
+    if (!frame.ok()) return frame.status();
+    if (!*frame) break;
+    const Timestamp begin = MonotonicNow();
+    const double cpu_begin_ms = ThreadCpuMs();
+    const std::shared_ptr<const MapSnapshot> snapshot = track(**frame);
+    const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin), ThreadCpuMs() - cpu_begin_ms};
+    if (const absl::Status status = recorder->Add(**frame, *snapshot, cost); !status.ok()) {
+      return status;
+    }
+    metric = snapshot->metric;
+    if (MonotonicNow() - told > kProgressEvery_ns) {
+      told = MonotonicNow();
+      std::cerr << absl::StrFormat("frame %d of %d: %s, %d features\n", recorder->frames(),
+                                   source.info().frame_count.value_or(0),
+                                   ToString(VerdictOf(*snapshot)), snapshot->features.size());
+    }
+  }
+  if (const absl::Status status = recorder->Close(); !status.ok()) return status;
+  nlohmann::ordered_json report = recorder->Report(source.bad_frames());
+  if (!truth.empty()) {
+    const auto interval_ns = static_cast<Timestamp>(1e9 / source.info().camera->intrinsics().fps);
+    AddScores(Associate(recorder->trajectory(), truth, interval_ns), metric, report);
+  }
+  const absl::Status written = WriteFileAtomically(folder / "report.json", report.dump(2) + "\n");
+  if (!written.ok()) return written;
+  return report;
+}
+
+}  // namespace saccade
