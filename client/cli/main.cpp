@@ -5,6 +5,7 @@
 
 #include "client/cli/commands.hpp"
 #include "client/cli/options.hpp"
+#include "client/cli/session_file.hpp"
 #include "client/net/connection.hpp"
 
 namespace {
@@ -26,10 +27,16 @@ int main(int argc, char** argv) {
   using namespace saccade;
   cli::ParseResult parsed = cli::ParseCommandLine(argc, argv);
   if (!parsed.options) return parsed.exit_code;
+  net::ConnectionOptions& options = parsed.options->connection;
+  // Watching is a session of its own; editing goes on in the one of the last run.
+  const bool keeps_session = parsed.options->command != cli::Command::kWatch;
   try {
-    const auto connection = net::Connection::Create(parsed.options->connection);
+    if (keeps_session) options.session_id = cli::LoadSession(options.server);
+    const auto connection = net::Connection::Create(options);
     if (!connection.ok()) return Fail(connection.status().message());
     const absl::Status status = cli::Run(*parsed.options, **connection);
+    const std::string& session = (*connection)->session_id();
+    if (keeps_session && session != options.session_id) cli::SaveSession(options.server, session);
     if (!status.ok()) return Fail(status.message());
   } catch (const std::exception& error) {  // e.g. text that is not UTF-8 meets JSON
     return Fail(error.what());

@@ -54,6 +54,18 @@ CLI::Validator Checked(Parse parse, const std::string& form) {
       form);
 }
 
+// Digits alone: a sign or a dot would be read as another number.
+CLI::Validator Id() {
+  return CLI::Validator(
+      [](std::string& text) {
+        std::uint64_t id = 0;
+        return absl::SimpleAtoi(text, &id) && text.find('-') == std::string::npos
+                   ? std::string()
+                   : absl::StrCat("'", text, "' is not an id (a whole number)");
+      },
+      "");
+}
+
 void AddMapAndPictures(CLI::App& app, Options& options, Raw& raw) {
   app.add_subcommand("status", "What the server is doing now");
   CLI::App* watch =
@@ -68,7 +80,7 @@ void AddMapAndPictures(CLI::App& app, Options& options, Raw& raw) {
       ->required();
   snapshot->add_option("--out", options.out, "The file to write")->required();
   snapshot->add_option("--frame", options.frame, "Frame id (kept for 10 s); else the newest")
-      ->check(CLI::NonNegativeNumber);
+      ->check(Id());
 }
 
 void AddAnnotate(CLI::App& app, Options& options, Raw& raw) {
@@ -77,10 +89,10 @@ void AddAnnotate(CLI::App& app, Options& options, Raw& raw) {
       annotate->add_option("--pixel", raw.pixel, "U,V in the raw picture; (0,0) is its first pixel")
           ->check(Checked([](const std::string& t) { return ParseNumbers(t, 2); }, "U,V"));
   annotate->add_option("--frame", options.frame, "Frame id of that picture; else the newest")
-      ->check(CLI::NonNegativeNumber)
+      ->check(Id())
       ->needs(pixel);
-  CLI::Option* feature = annotate->add_option("--feature", raw.feature, "Id of a feature")
-                             ->check(CLI::NonNegativeNumber);
+  CLI::Option* feature =
+      annotate->add_option("--feature", raw.feature, "Id of a feature")->check(Id());
   CLI::Option* point =
       annotate->add_option("--point", raw.point, "X,Y,Z in world [m]")
           ->check(Checked([](const std::string& t) { return ParseNumbers(t, 3); }, "X,Y,Z"));
@@ -113,7 +125,7 @@ void AddAnnotations(CLI::App& app, Options& options) {
 void AddGaze(CLI::App& app, Raw& raw) {
   CLI::App* fixate = app.add_subcommand("fixate", "Turn the camera to a point and hold it there");
   fixate->add_option("--annotation", raw.annotation, "Id of an annotation");
-  fixate->add_option("--feature", raw.feature, "Id of a feature")->check(CLI::NonNegativeNumber);
+  fixate->add_option("--feature", raw.feature, "Id of a feature")->check(Id());
   fixate->add_option("--point", raw.point, "X,Y,Z in world [m]")
       ->check(Checked([](const std::string& t) { return ParseNumbers(t, 3); }, "X,Y,Z"));
   app.add_subcommand("release", "Let the camera go");

@@ -192,6 +192,8 @@ absl::StatusOr<std::string> Connection::Session() {
   return impl_->session_id_;
 }
 
+const std::string& Connection::session_id() const { return impl_->session_id_; }
+
 absl::StatusOr<ServerStatus> Connection::GetStatus() {
   auto response =
       impl_->Call(*impl_->session_, &v1::SessionService::Stub::GetStatus, v1::GetStatusRequest());

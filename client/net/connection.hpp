@@ -48,6 +48,8 @@ class Connection {
 
   /// The session that calls are made in; joins, or joins anew if the server no longer knows it.
   absl::StatusOr<std::string> Session();
+  /// The same without asking the server; empty if no call needed one yet.
+  const std::string& session_id() const;
 
   absl::StatusOr<ServerStatus> GetStatus();
   /// The newest frame if `frame_id` is nothing.

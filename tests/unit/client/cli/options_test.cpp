@@ -2,15 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include <initializer_list>
+#include <string>
 #include <vector>
 
 namespace saccade::cli {
 namespace {
 
-ParseResult Parse(std::initializer_list<const char*> arguments) {
+ParseResult Parse(const std::vector<const char*>& arguments) {
   std::vector<const char*> argv = {"saccade"};
-  argv.insert(argv.end(), arguments);
+  argv.insert(argv.end(), arguments.begin(), arguments.end());
   return ParseCommandLine(static_cast<int>(argv.size()), argv.data());
 }
 
@@ -23,7 +23,7 @@ TEST(CommandLine, HelpAndVersionEndWithSuccess) {
 }
 
 TEST(CommandLine, BadUsageEndsWithTwo) {
-  const std::vector<std::initializer_list<const char*>> wrong = {
+  const std::vector<std::vector<const char*>> wrong = {
       {},
       {"bogus"},
       {"status", "extra"},
