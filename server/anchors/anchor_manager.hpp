@@ -15,6 +15,7 @@
 
 #include "server/anchors/anchor_options.hpp"
 #include "server/anchors/anchor_record.hpp"
+#include "server/anchors/click.hpp"
 #include "server/anchors/edit_history.hpp"
 #include "server/anchors/frame_ring.hpp"
 #include "server/anchors/stored_annotation.hpp"
@@ -48,6 +49,9 @@ class AnchorManager {
   /// in the map is known.
   void Load(std::vector<StoredAnnotation> stored);
 
+  /// Says whether `id` exists now; nothing otherwise.
+  std::optional<Annotation> Get(const std::string& id) const;
+
   /// Places something. The target is resolved with the pose of the frame it names, carried into the
   /// newest map. Errors:
   ///   InvalidArgument     not finite, pixel outside the image, size or text out of range
@@ -74,23 +78,31 @@ class AnchorManager {
   /// twice as sure since last stored); at most one in two seconds each. Not part of any undo.
   std::vector<AnnotationChange> TakeRefinements();
 
+  /// The session ended: what it did can no longer be undone.
+  void ForgetSession(const std::string& session_id);
+
   /// Everything up to `sequence` is on disk.
   void Committed(std::uint64_t sequence);
-  /// Takes back every change after the last Committed one, newest first.
-  void RollBack();
+  /// Takes back every change after `sequence`, newest first: the store could not keep them.
+  void RollBack(std::uint64_t sequence);
 
   /// All annotations as of the last Resolve or edit, oldest first; never null. Any thread.
   std::shared_ptr<const std::vector<Annotation>> Latest() const;
 
  private:
-  absl::StatusOr<AnnotationEdit> Apply(EditKind kind, const std::string& session_id, EditStep step,
-                                       EditHistory history_after);
+  absl::StatusOr<AnnotationEdit> Apply(EditKind kind, const std::string& session_id, EditStep step);
+  absl::StatusOr<AnnotationEdit> Commit(EditKind kind, const std::string& session_id,
+                                        const EditStep& step, EditHistory history,
+                                        const std::string& description);
   absl::StatusOr<AnnotationEdit> TakeBack(bool undo, const std::string& session_id);
   absl::Status Place(const AnnotationTarget& target, const std::vector<Eigen::Vector2d>& ink_px,
                      AnchorRecord& record);
   void Put(const std::string& id, const RecordPtr& record);
   AnchorRecord* Find(const std::string& id);
-  void Estimate(const CameraModel& camera, AnchorRecord& record);
+  absl::Status CheckReady() const;
+  bool Attach(AnchorRecord& record) const;
+  void Estimate(AnchorRecord& record) const;
+  std::optional<AnchorMoved> ResolveOne(bool map_corrected, AnchorRecord& record) const;
   void Publish();
 
   AnchorOptions options_;

@@ -10,6 +10,7 @@
 
 #include "server/anchors/anchor_options.hpp"
 #include "shared/geometry/rigid3.hpp"
+#include "shared/scene/annotation.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -40,9 +41,8 @@ struct ClusterMember {
 struct AnchorPlace {
   std::uint64_t id = 0;  // new with each placing; equal: the same place, edited otherwise
   std::uint64_t map_generation = 0;
-  bool attached = false;       // false: known only by its point, if at all (restart, reset)
-  bool known_in_world = true;  // the point means something in this generation's world frame
-  std::string world_key;       // of the world the point was placed in
+  bool attached = false;  // false: known only by its point, if at all (restart, reset)
+  std::string world_key;  // of the world the point was placed in
   AnchorMethod method = AnchorMethod::kPoint;
   std::vector<ClusterMember> members;
 
@@ -55,8 +55,11 @@ struct AnchorPlace {
   bool seed_is_target = false;    // the feature itself was chosen
 
   Rigid3 world_from_binding;
-  bool was_tracking = false;  // has been sure once: now TRACKING or PAUSED, not PROVISIONAL
-  bool paused = false;        // by its own error (hysteresis)
+  /// The seeded feature's own covariance while it was the better witness, in binding [m^2].
+  std::optional<Eigen::Matrix3d> seed_covariance;
+  Timestamp last_selected_ns = 0;  // members were last compared with the rest of the map
+  bool was_tracking = false;       // has been sure once: now TRACKING or PAUSED, not PROVISIONAL
+  bool paused = false;             // by its own error (hysteresis)
   Timestamp last_time_ns = 0;
 };
 
@@ -67,12 +70,10 @@ struct PlaceEstimate {
   Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // camera pose included [m^2]
 };
 
-/// Hangs `place`, whose point is given in world, on the nearest features with known depth. Without
-/// any it stays where it is in world.
-void Bind(const MapView& map, const AnchorOptions& options, AnchorPlace& place);
-
-/// Carries `place` to this frame: replaces members that the map dropped without moving the point,
-/// fits the members' motion, and takes over the seeded feature's better depth gradually.
+/// Carries `place` to this frame: fits the members' motion, replaces those that the map dropped
+/// without moving the point, and takes over the seeded feature's better depth gradually. A place
+/// without members (a new one) hangs itself on the nearest features with known depth; where there
+/// are none it stays where it is in world.
 PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place);
 
 }  // namespace saccade

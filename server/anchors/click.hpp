@@ -33,9 +33,15 @@ struct ResolvedTarget {
   std::optional<View> view;
 };
 
+/// Carries a transform from the map as `before` had it to the newest map: world frames differ by
+/// the corrections in between. Weighted by nearness to `ray_in_world` from the camera of `before`.
+Rigid3 NewestFromPast(const MapSnapshot& before, const MapView& newest,
+                      const Eigen::Vector3d& ray_in_world);
+
 /// Resolves a target (slam-spec section 9). Errors as AnchorManager::Create.
-absl::StatusOr<ResolvedTarget> Resolve(const AnnotationTarget& target, const FrameLookup& frames,
-                                       const MapView& newest, const AnchorOptions& options);
+absl::StatusOr<ResolvedTarget> ResolveTarget(const AnnotationTarget& target,
+                                             const FrameLookup& frames, const MapView& newest,
+                                             const AnchorOptions& options);
 
 /// The stroke as offsets from the anchor, on the surface that the click found [m]. Pixels whose ray
 /// misses that surface are put at the anchor's own distance.

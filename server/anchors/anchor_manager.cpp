@@ -1,0 +1,145 @@
+#include "server/anchors/anchor_manager.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/anchors/anchor_state.hpp"
+#include "server/anchors/edit_checks.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr double kStoreAgainM = 0.01;               // an anchor that moved by this is stored again
+constexpr Timestamp kStoreAgainNs = 2'000'000'000;  // at most this often
+
+}  // namespace
+
+AnchorManager::AnchorManager(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed)
+    : options_(std::move(options)),
+      frames_(std::move(frames)),
+      seed_(std::move(seed)),
+      latest_(std::make_shared<const std::vector<Annotation>>()) {}
+
+void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
+  for (StoredAnnotation& item : stored) {
+    AnchorRecord record;
+    record.annotation = std::move(item.annotation);
+    record.content_id = next_content_++;
+    record.place.id = record.content_id;
+    record.place.world_key = std::move(item.world_key);
+    record.place.method = record.annotation.anchor.method;
+    record.annotation.anchor =
+        DescribeDetached(MapSnapshot{}, options_, record.place, record.annotation.anchor);
+    record.stored_point = record.annotation.anchor.point_in_world;
+    record.stored_error_m = record.annotation.anchor.error_m;
+    records_.push_back(std::move(record));
+  }
+  Publish();
+}
+
+/// A place from another run or an earlier map: found again where the same target gave the world.
+bool AnchorManager::Attach(AnchorRecord& record) const {
+  const MapSnapshot& snapshot = newest_->snapshot();
+  AnchorPlace& place = record.place;
+  const Anchor& last = record.annotation.anchor;
+  const bool same_world = !place.world_key.empty() && place.world_key == options_.world_key;
+  if (!same_world || !snapshot.metric || snapshot.status != TrackingStatus::kTracking ||
+      !last.point_in_world.allFinite() || !last.covariance_in_world.allFinite()) {
+    return false;
+  }
+  AnchorPlace fresh;
+  fresh.id = place.id;
+  fresh.map_generation = snapshot.map_generation;
+  fresh.attached = true;
+  fresh.world_key = place.world_key;
+  fresh.method = place.method;
+  fresh.point = fresh.clicked_point = last.point_in_world;
+  fresh.clicked_covariance = last.covariance_in_world;
+  fresh.distance_m =
+      std::max(0.1, (last.point_in_world - snapshot.world_from_camera.translation).norm());
+  place = std::move(fresh);
+  return true;
+}
+
+void AnchorManager::Estimate(AnchorRecord& record) const {
+  const MapSnapshot& snapshot = newest_->snapshot();
+  AnchorPlace& place = record.place;
+  Anchor& anchor = record.annotation.anchor;
+  if (place.map_generation != snapshot.map_generation) place.attached = false;
+  if (!place.attached && !Attach(record)) {
+    anchor = DescribeDetached(snapshot, options_, place, anchor);
+    return;
+  }
+  anchor = DescribeAnchor(*newest_, *camera_, options_, Follow(*newest_, options_, place), place);
+}
+
+std::optional<AnchorMoved> AnchorManager::ResolveOne(bool map_corrected,
+                                                     AnchorRecord& record) const {
+  const Eigen::Vector3d before = record.annotation.anchor.point_in_world;
+  const bool was_attached = record.place.attached;
+  Estimate(record);
+  const Eigen::Vector3d delta = record.annotation.anchor.point_in_world - before;
+  const double limit =
+      newest_->snapshot().metric ? options_.moved_m : options_.moved_m * record.place.distance_m;
+  if (!was_attached || !(delta.norm() > limit)) return std::nullopt;
+  return AnchorMoved{record.annotation.id, delta,
+                     map_corrected ? "the map was corrected" : "the map near it was refined"};
+}
+
+std::vector<AnchorMoved> AnchorManager::Resolve(std::shared_ptr<const MapSnapshot> snapshot,
+                                                const CameraModel& camera) {
+  const bool corrected = newest_ && newest_->snapshot().map_revision != snapshot->map_revision;
+  newest_ = std::make_shared<const MapView>(std::move(snapshot));
+  camera_ = camera;
+  std::vector<AnchorMoved> moved;
+  for (AnchorRecord& record : records_) {
+    if (std::optional<AnchorMoved> jump = ResolveOne(corrected, record)) {
+      moved.push_back(std::move(*jump));
+    }
+  }
+  Publish();
+  return moved;
+}
+
+std::vector<AnnotationChange> AnchorManager::TakeRefinements() {
+  std::vector<AnnotationChange> changes;
+  if (!newest_) return changes;
+  const Timestamp now_ns = newest_->snapshot().capture_time_ns;
+  for (AnchorRecord& record : records_) {
+    const Anchor& anchor = record.annotation.anchor;
+    if (record.stored_time_ns == 0) {  // just placed or loaded: the edit itself stored it
+      record.stored_time_ns = now_ns;
+      record.stored_point = anchor.point_in_world;
+      record.stored_error_m = anchor.error_m;
+    }
+    const bool differs = (anchor.point_in_world - record.stored_point).norm() > kStoreAgainM ||
+                         anchor.error_m < 0.5 * record.stored_error_m;
+    if (!record.place.attached || anchor.state == AnchorState::kPaused || !differs ||
+        std::abs(now_ns - record.stored_time_ns) < kStoreAgainNs) {
+      continue;
+    }
+    record.stored_time_ns = now_ns;
+    record.stored_point = anchor.point_in_world;
+    record.stored_error_m = anchor.error_m;
+    changes.push_back({next_sequence_++, EditKind::kRefine, record.annotation.id, "", "",
+                       "refined " + ShortName(record.annotation),
+                       StoredAnnotation{record.annotation, record.place.world_key}});
+  }
+  return changes;
+}
+
+void AnchorManager::Publish() {
+  auto list = std::make_shared<std::vector<Annotation>>();
+  list->reserve(records_.size());
+  for (const AnchorRecord& record : records_) list->push_back(record.annotation);
+  const std::lock_guard lock(latest_mutex_);
+  latest_ = std::move(list);
+}
+
+std::shared_ptr<const std::vector<Annotation>> AnchorManager::Latest() const {
+  const std::lock_guard lock(latest_mutex_);
+  return latest_;
+}
+
+}  // namespace saccade
