@@ -3,6 +3,8 @@
 #include <absl/container/flat_hash_map.h>
 #include <absl/status/statusor.h>
 
+#include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -40,19 +42,32 @@ class AnnotationBook {
   std::vector<AnchorMoved> OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
                                       const CameraModel& camera);
 
+  /// The session ended: what it did can no longer be undone.
+  void ForgetSession(const std::string& session_id) { anchors_.ForgetSession(session_id); }
+
   /// All annotations, oldest first; never null. Any thread.
   std::shared_ptr<const std::vector<Annotation>> Latest() const { return anchors_.Latest(); }
 
  private:
   AnnotationBook(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
                  std::unique_ptr<AnnotationStore> store);
+  struct AnsweredCreate {
+    std::string annotation_id;
+    std::uint64_t sequence = 0;  // 0: before this run
+  };
+
+  /// Answers a Create that was made before; false if it was not.
+  bool AnswerAgain(const std::string& request_id, const AnnotationDone& done);
+  void Remember(const std::string& request_id, AnsweredCreate answered);
   /// Follows the store: forgets what is on disk; after a failed commit takes memory back.
   void Settle();
   void Commit(AnnotationEdit edit, AnnotationDone done);
+  void TakeBack(absl::StatusOr<AnnotationEdit> edit, DescriptionDone done);
 
   AnchorManager anchors_;
   std::unique_ptr<AnnotationStore> store_;
-  absl::flat_hash_map<std::string, std::string> requests_;  // request id to annotation id
+  absl::flat_hash_map<std::string, AnsweredCreate> requests_;  // by request id
+  std::deque<std::string> request_order_;                      // oldest first
 };
 
 }  // namespace saccade

@@ -69,6 +69,10 @@ class AnnotationStore {
   absl::Status failure() const;
   void Resume();
 
+  /// As Submit, without a change: `done` is called once all that was queued before is on disk, or
+  /// with the error that hit it.
+  absl::Status SubmitBarrier(Done done);
+
   /// Waits until all that was queued before is committed or has failed.
   absl::Status Flush();
 

@@ -1,0 +1,153 @@
+#include "server/store/annotation_book.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+namespace saccade {
+namespace {
+
+constexpr std::size_t kMaxRequests = 10'000;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<AnnotationBook>> AnnotationBook::Open(
+    AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
+    std::unique_ptr<AnnotationStore> store) {
+  if (absl::Status status = options.Validate(); !status.ok()) return status;
+  std::unique_ptr<AnnotationBook> book(
+      new AnnotationBook(std::move(options), std::move(frames), std::move(seed), std::move(store)));
+  if (!book->store_) return book;
+  absl::StatusOr<StoredAnnotations> stored = book->store_->LoadAll();
+  if (!stored.ok()) return stored.status();
+  for (AnsweredRequest& request : stored->requests) {
+    book->Remember(request.request_id, {std::move(request.annotation_id), 0});
+  }
+  book->anchors_.Load(std::move(stored->annotations));
+  return book;
+}
+
+AnnotationBook::AnnotationBook(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
+                               std::unique_ptr<AnnotationStore> store)
+    : anchors_(std::move(options), std::move(frames), std::move(seed)), store_(std::move(store)) {}
+
+void AnnotationBook::Remember(const std::string& request_id, AnsweredCreate answered) {
+  if (request_id.empty()) return;
+  requests_[request_id] = std::move(answered);
+  request_order_.push_back(request_id);
+  if (request_order_.size() <= kMaxRequests) return;
+  requests_.erase(request_order_.front());
+  request_order_.pop_front();
+}
+
+void AnnotationBook::Settle() {
+  if (!store_) return;
+  const absl::Status failure = store_->failure();
+  const std::uint64_t committed = store_->committed_sequence();
+  anchors_.Committed(committed);
+  if (failure.ok()) return;
+  anchors_.RollBack(committed);
+  absl::erase_if(requests_,
+                 [committed](const auto& request) { return request.second.sequence > committed; });
+  store_->Resume();
+}
+
+bool AnnotationBook::AnswerAgain(const std::string& request_id, const AnnotationDone& done) {
+  const auto found = requests_.find(request_id);
+  if (request_id.empty() || found == requests_.end()) return false;
+  const std::string& id = found->second.annotation_id;
+  std::optional<Annotation> annotation = anchors_.Get(id);
+  if (!annotation) {
+    done(absl::FailedPreconditionError(
+        absl::StrCat("request_id ", request_id, " created annotation ", id,
+                     ", which was deleted since; use a new request_id")));
+  } else if (!store_) {
+    done(*std::move(annotation));
+  } else {  // the first answer may still be on its way to the disk
+    const absl::Status queued =
+        store_->SubmitBarrier([done, answer = *std::move(annotation)](const absl::Status& status) {
+          status.ok() ? done(answer) : done(status);
+        });
+    if (!queued.ok()) done(queued);
+  }
+  return true;
+}
+
+void AnnotationBook::Commit(AnnotationEdit edit, AnnotationDone done) {
+  const std::uint64_t sequence = edit.change.sequence;
+  if (!store_) {
+    anchors_.Committed(sequence);
+    done(edit.annotation);
+    return;
+  }
+  const absl::Status queued =
+      store_->Submit(std::move(edit.change),
+                     [done, answer = std::move(edit.annotation)](const absl::Status& status) {
+                       status.ok() ? done(answer) : done(status);
+                     });
+  if (queued.ok()) return;
+  anchors_.RollBack(sequence - 1);
+  absl::erase_if(requests_,
+                 [sequence](const auto& request) { return request.second.sequence == sequence; });
+  Settle();
+  done(queued);
+}
+
+void AnnotationBook::Create(const AnnotationDraft& draft, const std::string& session_id,
+                            AnnotationDone done) {
+  Settle();
+  if (AnswerAgain(draft.request_id, done)) return;
+  absl::StatusOr<AnnotationEdit> edit = anchors_.Create(draft, session_id);
+  if (!edit.ok()) return done(edit.status());
+  Remember(draft.request_id, {edit->change.id, edit->change.sequence});
+  Commit(*std::move(edit), std::move(done));
+}
+
+void AnnotationBook::Update(const AnnotationPatch& patch, const std::string& session_id,
+                            AnnotationDone done) {
+  Settle();
+  absl::StatusOr<AnnotationEdit> edit = anchors_.Update(patch, session_id);
+  if (!edit.ok()) return done(edit.status());
+  Commit(*std::move(edit), std::move(done));
+}
+
+void AnnotationBook::Delete(const std::string& id, const std::string& session_id,
+                            AnnotationDone done) {
+  Settle();
+  absl::StatusOr<AnnotationEdit> edit = anchors_.Delete(id, session_id);
+  if (!edit.ok()) return done(edit.status());
+  Commit(*std::move(edit), std::move(done));
+}
+
+void AnnotationBook::TakeBack(absl::StatusOr<AnnotationEdit> edit, DescriptionDone done) {
+  if (!edit.ok()) return done(edit.status());
+  const std::string description = edit->change.description;
+  Commit(*std::move(edit), [done, description](const absl::StatusOr<Annotation>& annotation) {
+    annotation.ok() ? done(description) : done(annotation.status());
+  });
+}
+
+void AnnotationBook::Undo(const std::string& session_id, DescriptionDone done) {
+  Settle();
+  TakeBack(anchors_.Undo(session_id), std::move(done));
+}
+
+void AnnotationBook::Redo(const std::string& session_id, DescriptionDone done) {
+  Settle();
+  TakeBack(anchors_.Redo(session_id), std::move(done));
+}
+
+std::vector<AnchorMoved> AnnotationBook::OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
+                                                    const CameraModel& camera) {
+  Settle();
+  std::vector<AnchorMoved> moved = anchors_.Resolve(std::move(snapshot), camera);
+  if (store_) {
+    for (AnnotationChange& change : anchors_.TakeRefinements()) {
+      // Costs nothing if refused: the next refinement carries it.
+      store_->Submit(std::move(change), nullptr).IgnoreError();
+    }
+  }
+  return moved;
+}
+
+}  // namespace saccade
