@@ -1,8 +1,10 @@
+set(SACCADE_ARCH "x86-64-v3" CACHE STRING "Value for -march=: the oldest processor to run on")
+
 # Flags that every target of ours is built with, and the shared precompiled headers.
 add_library(saccade_build_options INTERFACE)
 target_compile_features(saccade_build_options INTERFACE cxx_std_20)
 target_compile_options(saccade_build_options INTERFACE
-  -Wall -Wextra -Wpedantic -Werror -Wshadow -Wnon-virtual-dtor -march=x86-64-v3
+  -Wall -Wextra -Wpedantic -Werror -Wshadow -Wnon-virtual-dtor -march=${SACCADE_ARCH}
   # GCC 12 false positives inside Eigen, protobuf and <regex> once inlined.
   -Wno-error=maybe-uninitialized -Wno-error=array-bounds -Wno-error=stringop-overflow
   -Wno-error=stringop-overread -Wno-error=restrict -Wno-error=dangling-pointer -Wno-psabi)
@@ -14,6 +16,10 @@ if(SACCADE_SANITIZER)
     -fsanitize=${SACCADE_SANITIZER} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(saccade_build_options INTERFACE -fsanitize=${SACCADE_SANITIZER})
 endif()
+
+# Says in one line that the processor is too old; itself it runs on any.
+add_library(saccade_cpu_check OBJECT ${CMAKE_CURRENT_LIST_DIR}/cpu_check.cpp)
+target_compile_options(saccade_cpu_check PRIVATE -march=x86-64)
 
 # saccade_library(NAME SOURCES ... PUBLIC ... PRIVATE ... [PCH eigen|vision|rpc])
 # A static library that carries the build options. SYSTEM keeps generated headers out of -Werror.
@@ -27,7 +33,7 @@ endfunction()
 # saccade_executable(NAME SOURCES ... LIBS ... [PCH ...])
 function(saccade_executable name)
   cmake_parse_arguments(ARG "" "PCH" "SOURCES;LIBS" ${ARGN})
-  add_executable(${name} ${ARG_SOURCES})
+  add_executable(${name} ${ARG_SOURCES} $<TARGET_OBJECTS:saccade_cpu_check>)
   target_link_libraries(${name} PRIVATE saccade_build_options ${ARG_LIBS})
   saccade_precompile(${name} "${ARG_PCH}")
 endfunction()
