@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/features/pose_fit.hpp"
+#include "server/map/picture_description.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
 #include "shared/scene/map_snapshot.hpp"
@@ -25,7 +26,7 @@ struct RelocaliserOptions {
   int candidates = 8;       // keyframes tried in full, best thumbnails first
   double ratio = 0.75;      // best / second-best descriptor distance
   int max_hamming = 64;     // of 256
-  int min_inliers = 12;
+  int min_inliers = 12;     // two thirds of them by descriptor alone
   double inlier_px = 3.0;
   std::uint64_t seed = 1;
   absl::Status Validate() const;
@@ -57,7 +58,8 @@ struct Relocalisation {
 ///
 /// Each keyframe keeps a thumbnail and, for each map feature visible in it, ORB descriptors at
 /// several scales. A query matches them to corners of the picture, best thumbnails first, and
-/// accepts a pose that at least `min_inliers` features support. Memory: about 30 KB a keyframe.
+/// accepts a pose that at least `min_inliers` features support. Memory: about 160 bytes a point
+/// and 5 KB a keyframe.
 /// One thread (the tracker's).
 class Relocaliser {
  public:
@@ -84,23 +86,33 @@ class Relocaliser {
   std::size_t size() const { return keyframes_.size(); }
 
  private:
-  static constexpr int kScales = 3;
-  using Descriptor = std::array<std::uint64_t, 4>;
   struct Keyframe {
     FrameId frame = 0;
     Rigid3 world_from_camera;
-    cv::Mat thumbnail;  // CV_32FC1, blurred, zero mean, unit norm
+    cv::Mat thumbnail;
     std::vector<KeyframePoint> points;
-    std::vector<Descriptor> descriptors;  // kScales per point, consecutive
-    std::vector<std::uint8_t> present;    // per descriptor
+    std::vector<DescribedPoint> described;  // of points
   };
-  struct Described;
+  struct Match {
+    FeatureId id = 0;
+    int corner = 0;  // into the picture's described corners
+    Eigen::Vector3d point_in_world;
+  };
 
-  Described Describe(const cv::Mat& grey) const;
-  std::vector<int> Shortlist(const cv::Mat& thumbnail) const;
-  std::optional<Relocalisation> TryKeyframe(const Keyframe& keyframe, const Described& picture,
-                                            const CameraModel& camera,
+  /// Keyframes most like the picture, best first, at most options.candidates.
+  std::vector<int> Shortlist(const cv::Mat& thumbnail,
+                             const std::vector<DescribedPoint>& corners) const;
+  std::vector<Match> MatchKeyframe(const Keyframe& keyframe,
+                                   const std::vector<DescribedPoint>& corners,
+                                   const PointLookup& lookup) const;
+  std::optional<Relocalisation> TryKeyframe(const Keyframe& keyframe, const CameraModel& camera,
+                                            const std::vector<DescribedPoint>& corners,
                                             const PointLookup& lookup) const;
+  /// Features of all keyframes that `pose` predicts near a corner of their look.
+  std::vector<Match> MatchGuided(const Rigid3& world_from_camera, const CameraModel& camera,
+                                 const std::vector<DescribedPoint>& corners,
+                                 const PointLookup& lookup) const;
+  void DropMostRedundant();
 
   RelocaliserOptions options_;
   std::vector<Keyframe> keyframes_;
