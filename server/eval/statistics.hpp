@@ -8,6 +8,9 @@ namespace saccade {
 class Sample {
  public:
   void Add(double value) { values_.push_back(value); }
+  void Add(const Sample& other) {
+    values_.insert(values_.end(), other.values_.begin(), other.values_.end());
+  }
   std::size_t size() const { return values_.size(); }
   const std::vector<double>& values() const { return values_; }
   double Mean() const;

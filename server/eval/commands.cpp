@@ -1,0 +1,61 @@
+#include "server/eval/commands.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <iostream>
+
+#include "server/capture/dataset.hpp"
+#include "server/eval/frame_range.hpp"
+#include "server/eval/run.hpp"
+#include "server/eval/run_recorder.hpp"
+#include "server/eval/score.hpp"
+#include "server/eval/tracker_session.hpp"
+
+namespace saccade {
+
+absl::Status RunCommand(const RunArguments& arguments) {
+  const absl::StatusOr<FrameRange> range = ParseFrameRange(arguments.frames);
+  if (!range.ok()) return range.status();
+  SourceOptions options;
+  options.first_frame = range->first;
+  options.end_frame = range->end;
+  const auto source = OpenDataset(arguments.dataset, options);
+  if (!source.ok()) return source.status();
+  Trajectory truth;
+  if (std::filesystem::exists(arguments.dataset / "groundtruth.txt")) {
+    absl::StatusOr<Trajectory> loaded = LoadTrajectory(arguments.dataset / "groundtruth.txt");
+    if (!loaded.ok()) return loaded.status();
+    truth = *std::move(loaded);
+  }
+  const auto session = MakeTrackerSession((*source)->info(), arguments.tracker);
+  if (!session.ok()) return session.status();
+  const auto report = RunTracker(**source, session->track, truth, arguments.out);
+  if (!report.ok()) return report.status();
+  std::cout << (arguments.json ? report->dump(2) + "\n" : SummaryTable(*report));
+  return absl::OkStatus();
+}
+
+absl::Status ScoreCommand(const ScoreArguments& arguments) {
+  const absl::StatusOr<Trajectory> estimate = LoadTrajectory(arguments.estimate);
+  if (!estimate.ok()) return estimate.status();
+  const absl::StatusOr<Trajectory> truth = LoadTrajectory(arguments.truth);
+  if (!truth.ok()) return truth.status();
+  const bool metric = arguments.align == "se3";
+  const std::vector<PosePair> pairs = Associate(*estimate, *truth);
+  const absl::StatusOr<TrajectoryScore> score =
+      Score(pairs, metric ? Alignment::kSe3 : Alignment::kSim3);
+  if (!score.ok()) {
+    return absl::Status(score.status().code(),
+                        absl::StrCat(arguments.estimate.string(), " against ",
+                                     arguments.truth.string(), ": ", score.status().message()));
+  }
+  nlohmann::ordered_json report;
+  report["estimate_frames"] = estimate->size();
+  report["align"] = arguments.align;
+  report["ate_m"] = metric ? score->ate_se3_m : score->ate_sim3_m;
+  AddScores(pairs, metric, report);
+  std::cout << report.dump(2) << "\n";
+  return absl::OkStatus();
+}
+
+}  // namespace saccade

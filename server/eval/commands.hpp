@@ -1,0 +1,47 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace saccade {
+
+/// `--config` and `--set`, in this order: a later one wins.
+struct TrackerArguments {
+  std::filesystem::path config;
+  std::vector<std::string> set;  // key=value
+};
+
+struct RunArguments {
+  std::filesystem::path dataset, out;
+  TrackerArguments tracker;
+  std::string frames;  // A:B, empty for all
+  bool json = false;
+};
+struct ScoreArguments {
+  std::filesystem::path estimate, truth;
+  std::string align = "se3";
+};
+struct SimArguments {
+  std::string scenario;
+  int runs = 1;
+  std::uint64_t seed = 1;
+  std::filesystem::path out;
+  double duration_s = 60.0;
+  TrackerArguments tracker;
+  bool json = false;
+};
+
+/// The subcommands of saccade-eval (architecture section 4). Results go to stdout, errors come
+/// back.
+absl::Status RunCommand(const RunArguments& arguments);
+absl::Status ScoreCommand(const ScoreArguments& arguments);
+absl::Status SimCommand(const SimArguments& arguments);
+
+/// Scenarios that SimCommand knows, for people: "points, desk, ...".
+std::string ScenarioNames();
+
+}  // namespace saccade

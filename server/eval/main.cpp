@@ -1,0 +1,101 @@
+#include <absl/status/status.h>
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <opencv2/core/utility.hpp>
+
+#include "server/eval/commands.hpp"
+
+namespace saccade {
+namespace {
+
+/// One line on stderr; 1, the exit code of a failure.
+int Fail(const absl::Status& status) {
+  std::string text(status.message());
+  for (char& c : text) {
+    if (c == '\n') c = ' ';
+  }
+  std::cerr << "saccade-eval: " << text << "\n";
+  return 1;
+}
+
+void AddRun(CLI::App& app, RunArguments& arguments) {
+  CLI::App* run = app.add_subcommand("run", "Track a recording and score it");
+  run->add_option("--dataset", arguments.dataset, "Folder in TUM layout")->required();
+  run->add_option("--out", arguments.out, "Folder for trajectory.tum, frames.csv and report.json")
+      ->required();
+  run->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
+  run->add_option("--set", arguments.tracker.set,
+                  "One tracker option as key=value; may be repeated")
+      ->take_all();
+  run->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
+  run->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
+}
+
+void AddScore(CLI::App& app, ScoreArguments& arguments) {
+  CLI::App* score = app.add_subcommand("score", "Compare two trajectories; prints JSON");
+  score->add_option("--estimate", arguments.estimate, "TUM file")->required();
+  score->add_option("--truth", arguments.truth, "TUM file")->required();
+  score->add_option("--align", arguments.align, "se3 for metric maps, else sim3")
+      ->check(CLI::IsMember({"se3", "sim3"}))
+      ->capture_default_str();
+}
+
+void AddSim(CLI::App& app, SimArguments& arguments) {
+  CLI::App* sim = app.add_subcommand("sim", "Monte-Carlo runs on the simulator");
+  sim->add_option("--scenario", arguments.scenario, absl::StrCat("One of ", ScenarioNames()))
+      ->required();
+  sim->add_option("--runs", arguments.runs, "Number of runs")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  sim->add_option("--seed", arguments.seed, "Seed of the first run; run k takes seed + k")
+      ->capture_default_str();
+  sim->add_option("--out", arguments.out, "Folder for report.json and one folder for each run")
+      ->required();
+  sim->add_option("--duration", arguments.duration_s, "Seconds of each run")
+      ->check(CLI::Range(1.0, 36000.0))
+      ->capture_default_str();
+  sim->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
+  sim->add_option("--set", arguments.tracker.set,
+                  "One tracker option as key=value; may be repeated")
+      ->take_all();
+  sim->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
+}
+
+int Main(int argc, char** argv) {
+  if (__builtin_cpu_supports("avx2") == 0 || __builtin_cpu_supports("fma") == 0) {
+    std::cerr << "saccade-eval: this build needs an x86-64-v3 processor (AVX2 and FMA); build it "
+                 "with an older -march\n";
+    return 1;
+  }
+  cv::setNumThreads(1);  // results must not depend on the machine's cores
+  CLI::App app("Saccade's evaluation: runs on recordings, scores, simulation", "saccade-eval");
+  app.set_version_flag("--version", "saccade-eval " SACCADE_VERSION);
+  app.require_subcommand(1);
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    return absl::StrCat(failed->get_name(), ": ", error.what(), "; see --help\n");
+  });
+  RunArguments run;
+  ScoreArguments score;
+  SimArguments sim;
+  AddRun(app, run);
+  AddScore(app, score);
+  AddSim(app, sim);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  absl::Status status;
+  if (app.got_subcommand("run")) status = RunCommand(run);
+  if (app.got_subcommand("score")) status = ScoreCommand(score);
+  if (app.got_subcommand("sim")) status = SimCommand(sim);
+  return status.ok() ? 0 : Fail(status);
+}
+
+}  // namespace
+}  // namespace saccade
+
+int main(int argc, char** argv) { return saccade::Main(argc, argv); }

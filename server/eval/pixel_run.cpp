@@ -1,0 +1,211 @@
+#include "server/eval/pixel_run.hpp"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <cmath>
+
+#include "server/eval/registration.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr double kClickBorder_px = 40.0;  // nobody clicks the very edge
+constexpr int kClickTries = 50;
+constexpr double kMinDistance_m = 0.25;
+
+const char* ToString(AnchorState state) {
+  switch (state) {
+    case AnchorState::kProvisional:
+      return "provisional";
+    case AnchorState::kTracking:
+      return "tracking";
+    case AnchorState::kPaused:
+      return "paused";
+    case AnchorState::kStopped:
+      return "stopped";
+  }
+  return "stopped";
+}
+
+std::string StampText(const Frame& frame) {
+  return frame.source_timestamp.empty() ? absl::StrFormat("%.9f", Seconds(frame.capture_time_ns))
+                                        : frame.source_timestamp;
+}
+
+}  // namespace
+
+void PixelRunTotals::Add(const PixelRunTotals& other) {
+  frames += other.frames;
+  lost_frames += other.lost_frames;
+  initialising_frames += other.initialising_frames;
+  coasting_frames += other.coasting_frames;
+  anchors += other.anchors;
+  refused_clicks += other.refused_clicks;
+  views += other.views;
+  tracking_views += other.tracking_views;
+  drawn_views += other.drawn_views;
+  squared_px.Add(other.squared_px);
+  squared_mm_per_m.Add(other.squared_mm_per_m);
+  frame_ms.Add(other.frame_ms);
+}
+
+absl::StatusOr<PixelRun> PixelRun::Create(const SimOptions& options,
+                                          const TrackerArguments& tracker, const ClickPlan& plan,
+                                          const std::filesystem::path& folder) {
+  absl::StatusOr<std::unique_ptr<SimSource>> source = SimSource::Open(options);
+  if (!source.ok()) return source.status();
+  absl::StatusOr<TrackerSession> session = MakeTrackerSession((*source)->info(), tracker);
+  if (!session.ok()) return session.status();
+  absl::StatusOr<RunRecorder> recorder = RunRecorder::Create(folder);
+  if (!recorder.ok()) return recorder.status();
+  absl::StatusOr<OutputFile> truth = OutputFile::Create(folder / "groundtruth.txt");
+  if (!truth.ok()) return truth.status();
+  absl::StatusOr<OutputFile> anchors = OutputFile::Create(folder / "anchors.csv");
+  if (!anchors.ok()) return anchors.status();
+  return PixelRun(*std::move(source), *std::move(session), *std::move(recorder), *std::move(truth),
+                  *std::move(anchors), options, plan);
+}
+
+PixelRun::PixelRun(std::unique_ptr<SimSource> source, TrackerSession session, RunRecorder recorder,
+                   OutputFile truth_file, OutputFile anchors_file, const SimOptions& options,
+                   const ClickPlan& plan)
+    : source_(std::move(source)),
+      session_(std::move(session)),
+      recorder_(std::move(recorder)),
+      truth_file_(std::move(truth_file)),
+      anchors_file_(std::move(anchors_file)),
+      plan_(plan),
+      fps_(options.fps),
+      rng_(options.seed),
+      ring_(std::make_unique<FrameRing>()) {
+  AnchorOptions anchor_options;
+  if (source_->info().target) anchor_options.world_key = WorldKey(*source_->info().target);
+  anchors_ = std::make_unique<AnchorManager>(
+      anchor_options, [ring = ring_.get()](FrameId id) { return ring->Find(id); }, session_.seed);
+  truth_file_.Write("# timestamp tx ty tz qx qy qz qw   (camera in world, metres)\n");
+  anchors_file_.Write(
+      "frame,anchor,state,drawn,true_u_px,true_v_px,error_px,error_mm_per_m,error_m,reported_error_"
+      "m\n");
+}
+
+absl::StatusOr<std::optional<double>> PixelRun::Run(PixelRunTotals& totals) {
+  while (true) {
+    absl::StatusOr<std::optional<Frame>> frame = source_->Next();
+    if (!frame.ok()) return frame.status();
+    if (!*frame) break;
+    if (const absl::Status status = Step(**frame, totals); !status.ok()) return status;
+  }
+  totals.frames += recorder_.frames();
+  totals.lost_frames += recorder_.CountOf(FrameVerdict::kLost);
+  totals.initialising_frames += recorder_.CountOf(FrameVerdict::kInitialising);
+  totals.coasting_frames += recorder_.CountOf(FrameVerdict::kCoasting);
+  totals.anchors += clicked_.size();
+  for (const absl::Status& status :
+       {recorder_.Close(), truth_file_.Close(), anchors_file_.Close()}) {
+    if (!status.ok()) return status;
+  }
+  const absl::StatusOr<TrajectoryScore> score =
+      Score(Associate(recorder_.trajectory(), truth_), Alignment::kSe3);
+  return score.ok() ? std::optional(score->ate_se3_m) : std::nullopt;
+}
+
+absl::Status PixelRun::Step(const Frame& frame, PixelRunTotals& totals) {
+  const Timestamp begin = MonotonicNow();
+  const double cpu_begin_ms = ThreadCpuMs();
+  const std::shared_ptr<const MapSnapshot> snapshot = session_.track(frame);
+  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin), ThreadCpuMs() - cpu_begin_ms};
+  totals.frame_ms.Add(cost.wall_ms);
+
+  const Rigid3 truth = source_->WorldFromCamera(frame.id);
+  truth_.push_back({frame.capture_time_ns, truth});
+  truth_file_.Write(TumLine(StampText(frame), truth));
+  FrameVerdict verdict = VerdictOf(*snapshot);
+  const bool pose_published =
+      verdict == FrameVerdict::kTracked || verdict == FrameVerdict::kCoasting;
+  if (pose_published && IsLost(snapshot->world_from_camera, truth)) verdict = FrameVerdict::kLost;
+  if (const absl::Status status = recorder_.Add(frame, *snapshot, cost, verdict); !status.ok()) {
+    return status;
+  }
+  ring_->Push({std::make_shared<const Frame>(frame), snapshot});
+  anchors_->Resolve(snapshot, *frame.camera);
+  ClickIfDue(frame.id, totals);
+  CompareAnchors(frame, *snapshot, pose_published, totals);
+  return anchors_file_.status().ok() ? truth_file_.status() : anchors_file_.status();
+}
+
+void PixelRun::ClickIfDue(FrameId now, PixelRunTotals& totals) {
+  const double time_s = static_cast<double>(now) / fps_;
+  const double due_s = plan_.first_s + clicks_ * plan_.every_s;
+  if (time_s < due_s || due_s > plan_.last_s) return;
+  ++clicks_;
+  const auto delay = static_cast<FrameId>(std::lround(plan_.delay_s * fps_));
+  const FrameId seen = now > delay ? now - delay : 0;  // what the expert had on screen
+  const std::optional<SurfacePixel> surface = PickSurface(seen);
+  if (!surface) {
+    ++totals.refused_clicks;
+    return;
+  }
+  AnnotationDraft draft;
+  draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", clicks_);
+  draft.author = "expert";
+  draft.target = PixelTarget{seen, surface->pixel};
+  const absl::StatusOr<AnnotationEdit> edit = anchors_->Create(draft, "expert");
+  if (!edit.ok()) {
+    anchors_file_.Write(absl::StrCat("# click ", clicks_, " in frame ", seen,
+                                     " refused: ", edit.status().message(), "\n"));
+    ++totals.refused_clicks;
+    return;
+  }
+  anchors_->Committed(edit->change.sequence);
+  clicked_.push_back({edit->annotation.id, clicks_, surface->point_in_world});
+}
+
+std::optional<PixelRun::SurfacePixel> PixelRun::PickSurface(FrameId frame) {
+  const CameraModel& camera = *source_->info().camera;
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (int i = 0; i < kClickTries; ++i) {
+    const Eigen::Vector2d pixel(
+        kClickBorder_px + unit(rng_) * (camera.width() - 1 - 2 * kClickBorder_px),
+        kClickBorder_px + unit(rng_) * (camera.height() - 1 - 2 * kClickBorder_px));
+    const auto point = source_->PointAt(frame, pixel);
+    if (!point || !source_->Visible(frame, *point)) continue;
+    if ((source_->WorldFromCamera(frame).translation - *point).norm() < kMinDistance_m) continue;
+    return SurfacePixel{pixel, *point};
+  }
+  return std::nullopt;
+}
+
+void PixelRun::CompareAnchors(const Frame& frame, const MapSnapshot& snapshot, bool pose_published,
+                              PixelRunTotals& totals) {
+  const auto latest = anchors_->Latest();
+  for (const Clicked& clicked : clicked_) {
+    const auto true_pixel = source_->PixelOf(frame.id, clicked.true_point);
+    if (!true_pixel || !frame.camera->InImage(*true_pixel)) continue;
+    if (!source_->Visible(frame.id, clicked.true_point)) continue;
+    const Anchor* anchor = nullptr;
+    for (const Annotation& annotation : *latest) {
+      if (annotation.id == clicked.id) anchor = &annotation.anchor;
+    }
+    const AnchorState state = anchor != nullptr ? anchor->state : AnchorState::kStopped;
+    const bool drawn = pose_published && anchor != nullptr &&
+                       (state == AnchorState::kTracking || state == AnchorState::kProvisional);
+    const auto error = CompareRegistration(
+        *frame.camera, source_->WorldFromCamera(frame.id), clicked.true_point,
+        snapshot.world_from_camera, drawn ? std::optional(anchor->point_in_world) : std::nullopt);
+    if (!error) continue;
+    ++totals.views;
+    totals.tracking_views += state == AnchorState::kTracking && pose_published ? 1 : 0;
+    totals.drawn_views += drawn ? 1 : 0;
+    totals.squared_px.Add(error->pixels * error->pixels);
+    if (error->mm_per_m) totals.squared_mm_per_m.Add(*error->mm_per_m * *error->mm_per_m);
+    anchors_file_.Write(absl::StrFormat(
+        "%d,%d,%s,%d,%.2f,%.2f,%.3f,%s,%.5f,%.5f\n", frame.id, clicked.number, ToString(state),
+        drawn ? 1 : 0, true_pixel->x(), true_pixel->y(), error->pixels,
+        error->mm_per_m ? absl::StrFormat("%.3f", *error->mm_per_m) : "",
+        anchor != nullptr ? (anchor->point_in_world - clicked.true_point).norm() : 0.0,
+        anchor != nullptr ? anchor->error_m : 0.0));
+  }
+}
+
+}  // namespace saccade
