@@ -37,6 +37,16 @@ class Inbox {
     return replaced;
   }
 
+  /// Puts an item only if none waits.
+  void PutNewestIfEmpty(Item item) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (item_.has_value()) return;
+      item_ = std::move(item);
+    }
+    changed_.notify_all();
+  }
+
   /// Waits until the item before was taken. False if `stop` came first.
   bool PutWait(Item item, std::stop_token stop) {
     {

@@ -54,16 +54,11 @@ void AnnotationService::Submit(grpc::ServerUnaryReactor* reactor, const char* me
 template <typename Response>
 Done<Annotation> AnnotationService::Answer(grpc::ServerUnaryReactor* reactor, Response* response,
                                            const char* method, const std::string& session_id) {
-  return
-      [this, reactor, response, method, session_id](const absl::StatusOr<Annotation>& annotation) {
-        if (annotation.ok()) {
-          const std::optional<TrackedEvent> newest = hub_.newest();
-          *response->mutable_annotation() = newest ? AnnotationToProto(*annotation, *newest)
-                                                   : wire::ToProto(*annotation, std::nullopt);
-        }
-        Audit(method, session_id, annotation.status());
-        reactor->Finish(ToGrpc(annotation.status()));
-      };
+  return [reactor, response, method, session_id](const absl::StatusOr<Annotation>& annotation) {
+    if (annotation.ok()) *response->mutable_annotation() = wire::ToProto(*annotation);
+    Audit(method, session_id, annotation.status());
+    reactor->Finish(ToGrpc(annotation.status()));
+  };
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext* context,
@@ -123,7 +118,7 @@ grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* c
                                                   v1::ListAnnotationsResponse* response) {
   if (const std::optional<TrackedEvent> newest = hub_.newest()) {
     for (const Annotation& annotation : *newest->annotations) {
-      *response->add_annotations() = AnnotationToProto(annotation, *newest);
+      *response->add_annotations() = wire::ToProto(annotation);
     }
   }
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();

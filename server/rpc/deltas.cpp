@@ -101,7 +101,7 @@ bool AnnotationDeltaTracker::Next(const TrackedEvent& event, Timestamp now_ns,
   delta.set_full(full);
   for (const Annotation& annotation : *event.annotations) {
     if (Upsert(annotation, event, now_ns)) {
-      *delta.add_upserted() = AnnotationToProto(annotation, event);
+      *delta.add_upserted() = wire::ToProto(annotation);
     }
   }
   absl::erase_if(sent_, [this, &delta](const auto& entry) {
@@ -117,11 +117,6 @@ v1::MapDelta FullMap(const MapSnapshot& snapshot) {
   v1::MapDelta delta;
   tracker.Next(snapshot, delta);
   return delta;
-}
-
-v1::Annotation AnnotationToProto(const Annotation& annotation, const TrackedEvent& event) {
-  return wire::ToProto(annotation, wire::PixelInFrame(*event.snapshot, *event.camera,
-                                                      annotation.anchor.point_in_world));
 }
 
 }  // namespace saccade

@@ -61,7 +61,4 @@ class AnnotationDeltaTracker {
 /// The whole map in one message.
 v1::MapDelta FullMap(const MapSnapshot& snapshot);
 
-/// An annotation with its pixel in the event's frame.
-v1::Annotation AnnotationToProto(const Annotation& annotation, const TrackedEvent& event);
-
 }  // namespace saccade

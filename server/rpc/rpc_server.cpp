@@ -51,7 +51,9 @@ class RpcServer::Impl {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
     SetArguments(options, builder);
-    const std::string address = absl::StrCat(options.host, ":", options.port);
+    const bool v6 = options.host.find(':') != std::string::npos;
+    const std::string address =
+        absl::StrCat(v6 ? "[" : "", options.host, v6 ? "]:" : ":", options.port);
     builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port_);
     builder.RegisterService(&session_service_);
     builder.RegisterService(&annotation_service_);

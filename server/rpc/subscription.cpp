@@ -60,9 +60,13 @@ absl::StatusOr<SubscriptionOptions> SubscriptionOptions::FromProto(
 }
 
 void Subscription::Offer(const TrackedEvent& event) {
-  if (pose_due_ && Has(v1::TOPIC_POSE)) ++poses_skipped_;
+  // Between frames the annotations alone change: the pose is known already.
+  const bool same_frame = tracked_ && tracked_->snapshot == event.snapshot;
   tracked_ = event;
-  pose_due_ = map_due_ = annotations_due_ = true;
+  annotations_due_ = true;
+  if (same_frame) return;
+  if (pose_due_ && Has(v1::TOPIC_POSE)) ++poses_skipped_;
+  pose_due_ = map_due_ = true;
 }
 
 void Subscription::Offer(const std::shared_ptr<const VideoPacket>& packet) {

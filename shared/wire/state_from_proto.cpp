@@ -250,6 +250,9 @@ absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string
   out.anchor.covariance_in_world = *covariance;
   out.anchor.error_m = anchor.error_mm() * 1e-3;
   if (anchor.has_error_px()) out.anchor.error_px = anchor.error_px();
+  if (anchor.has_pixel()) {
+    out.anchor.pixel = Eigen::Vector2d(anchor.pixel().u(), anchor.pixel().v());
+  }
   out.anchor.reason = anchor.reason();
   for (const v1::Vector3& offset : message.ink_offset_m()) {
     absl::StatusOr<Eigen::Vector3d> one = FromProto(offset, absl::StrCat(field, ".ink_offset_m"));

@@ -214,7 +214,7 @@ v1::PoseEvent ToProtoPose(const MapSnapshot& snapshot, Timestamp captured_ns) {
   return message;
 }
 
-v1::Annotation ToProto(const Annotation& annotation, const std::optional<Eigen::Vector2d>& pixel) {
+v1::Annotation ToProto(const Annotation& annotation) {
   v1::Annotation message;
   message.set_id(annotation.id);
   message.set_shape(ToProto(annotation.shape));
@@ -232,7 +232,7 @@ v1::Annotation ToProto(const Annotation& annotation, const std::optional<Eigen::
   anchor.set_error_mm(annotation.anchor.error_m * 1e3);
   if (annotation.anchor.error_px) anchor.set_error_px(*annotation.anchor.error_px);
   anchor.set_reason(annotation.anchor.reason);
-  if (pixel) *anchor.mutable_pixel() = ToProto(*pixel);
+  if (annotation.anchor.pixel) *anchor.mutable_pixel() = ToProto(*annotation.anchor.pixel);
   for (const Eigen::Vector3d& offset : annotation.ink_offset_m) {
     *message.add_ink_offset_m() = ToProto(offset);
   }
@@ -253,14 +253,6 @@ v1::AnnotationTarget ToProto(const AnnotationTarget& target) {
     *message.mutable_ray()->mutable_direction_in_world() = ToProto(ray->direction_in_world);
   }
   return message;
-}
-
-std::optional<Eigen::Vector2d> PixelInFrame(const MapSnapshot& snapshot, const CameraModel& camera,
-                                            const Eigen::Vector3d& point_in_world) {
-  const std::optional<Eigen::Vector2d> pixel =
-      camera.Project(snapshot.world_from_camera.Inverse() * point_in_world);
-  if (!pixel || !camera.InImage(*pixel)) return std::nullopt;
-  return pixel;
 }
 
 }  // namespace saccade::wire

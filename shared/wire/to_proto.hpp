@@ -27,14 +27,9 @@ v1::AnnotationShape ToProto(AnnotationShape shape);
 /// `captured_ns`: the frame's exposure middle on the server's monotonic clock.
 v1::PoseEvent ToProtoPose(const MapSnapshot& snapshot, Timestamp captured_ns);
 
-/// `pixel`: where the anchor is in the newest frame; nothing: out of view.
-v1::Annotation ToProto(const Annotation& annotation, const std::optional<Eigen::Vector2d>& pixel);
+v1::Annotation ToProto(const Annotation& annotation);
 
 /// A target as a client asks for it.
 v1::AnnotationTarget ToProto(const AnnotationTarget& target);
-
-/// Pixel of a point in the snapshot's own frame, if it is inside the picture.
-std::optional<Eigen::Vector2d> PixelInFrame(const MapSnapshot& snapshot, const CameraModel& camera,
-                                            const Eigen::Vector3d& point_in_world);
 
 }  // namespace saccade::wire

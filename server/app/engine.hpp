@@ -1,0 +1,109 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "server/anchors/frame_ring.hpp"
+#include "server/app/frame_clock.hpp"
+#include "server/app/frame_tracker.hpp"
+#include "server/app/view_encoder.hpp"
+#include "server/capture/frame_source.hpp"
+#include "server/pipeline/inbox.hpp"
+#include "server/pipeline/rolling_statistics.hpp"
+#include "server/rpc/backend.hpp"
+#include "server/store/annotation_book.hpp"
+
+namespace saccade {
+
+struct EngineOptions {
+  std::string version;
+  bool every_frame = false;      // --speed max: the source waits for the tracker, nothing dropped
+  int video_bit_rate_bit_s = 0;  // per view; 0: by picture size
+  std::size_t mailbox = 64;      // commands that may wait for the tracker thread
+  AnchorOptions anchors;
+};
+
+/// Capture to packets: owns the threads and what they share.
+///
+///   source thread   FrameSource::Next
+///   tracker thread  commands, tracker, anchors; publishes to the sink
+///   view threads    one per view: draw, code
+///   still thread    PNG for GetFrame
+///   clock thread    statistics once a second
+class Engine : public Backend {
+ public:
+  /// `store` may be null: annotations are kept in memory alone. `sink` outlives the engine.
+  static absl::StatusOr<std::unique_ptr<Engine>> Create(EngineOptions options,
+                                                        std::unique_ptr<FrameSource> source,
+                                                        std::unique_ptr<FrameTracker> tracker,
+                                                        std::unique_ptr<AnnotationStore> store,
+                                                        EventSink& sink);
+  ~Engine() override;
+
+  void Start();
+  /// Ends the threads and answers every command. May be called twice.
+  void Stop();
+
+  absl::Status Submit(Command command) override;
+  const ServerFacts& facts() const override { return facts_; }
+  void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) override;
+  void SetVideoDemand(VideoView view, bool wanted) override;
+  void RequestKeyFrame(VideoView view) override;
+
+ private:
+  // What the tracker thread waits for: a frame, the end of the source, or (neither) a second
+  // without frames, in which commits still have to be settled.
+  struct Input {
+    std::optional<Frame> frame;
+    bool end_of_source = false;
+  };
+  struct StillRequest {
+    PastFrame past;
+    VideoView view;
+    Done<Still> done;
+  };
+
+  Engine(EngineOptions options, std::unique_ptr<FrameSource> source,
+         std::unique_ptr<FrameTracker> tracker, EventSink& sink);
+
+  void RunSource(std::stop_token stop);
+  void RunTracker(std::stop_token stop);
+  void RunClock(std::stop_token stop);
+  void Track(Frame frame);
+  void Settle();
+  void Publish();
+  void Execute(Command command);
+  void ResetTracker(const ResetMap& command);
+  void MakeStill(StillRequest request);
+  EngineStatistics Statistics() const;
+  cv::Mat DrawAugmented(const TrackedFrame& frame) const;
+
+  const EngineOptions options_;
+  ServerFacts facts_;
+  EventSink& sink_;
+  std::unique_ptr<FrameSource> source_;    // source thread
+  std::unique_ptr<FrameTracker> tracker_;  // tracker thread
+  std::unique_ptr<AnnotationBook> book_;   // tracker thread, but for Latest()
+  FrameRing ring_;
+  Inbox<Input, Command> inbox_;
+  std::array<std::unique_ptr<ViewEncoder>, kVideoViews> views_;
+
+  // Tracker thread.
+  FrameClock clock_;
+  std::optional<TrackedFrame> last_;
+
+  RollingStatistics captured_, track_ms_;
+  std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, bad_frames_ = 0;
+  std::atomic<Timestamp> tracked_ns_ = 0;  // when a frame last came
+
+  Runner<StillRequest> stills_;
+  std::jthread source_thread_, tracker_thread_, clock_thread_;
+  bool stopped_ = false;
+};
+
+}  // namespace saccade

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <optional>
+
+#include "shared/time/timestamp.hpp"
+
+namespace saccade {
+
+/// Brings capture times to the monotonic clock. Live sources are on it already; a recording has a
+/// clock of its own, and its frames count as captured at the latest possible moments that keep
+/// their distances and lie before their arrival.
+class FrameClock {
+ public:
+  /// `received_ns`: MonotonicNow() when the picture was complete.
+  Timestamp ToMonotonic(Timestamp capture_ns, Timestamp received_ns) {
+    const Timestamp difference = received_ns - capture_ns;
+    if (!offset_ns_) {
+      const bool live = difference >= 0 && difference < kLiveNs;
+      offset_ns_ = live ? 0 : difference;
+      adapts_ = !live;
+    }
+    if (adapts_) offset_ns_ = std::min(*offset_ns_, difference);
+    return capture_ns + *offset_ns_;
+  }
+
+ private:
+  static constexpr Timestamp kLiveNs = 1'000'000'000;
+  std::optional<Timestamp> offset_ns_;
+  bool adapts_ = false;
+};
+
+}  // namespace saccade

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <memory>
+
+#include "server/capture/frame.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+namespace saccade {
+
+/// What the engine needs of a tracker; the tracker thread alone calls it. Tests put their own in.
+class FrameTracker {
+ public:
+  virtual ~FrameTracker() = default;
+  /// Never null.
+  virtual std::shared_ptr<const MapSnapshot> Track(const Frame& frame) = 0;
+  /// Throws the map away.
+  virtual void Reset() = 0;
+  /// Starts a feature at a clicked pixel of a past frame.
+  virtual absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame,
+                                                const Rigid3& world_from_camera,
+                                                const Eigen::Vector2d& pixel, double depth_prior_m,
+                                                double depth_sigma_m) = 0;
+};
+
+/// Video without tracking: every frame is INITIALISING, and says so.
+class NoTracker final : public FrameTracker {
+ public:
+  std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override;
+  void Reset() override { ++generation_; }
+  absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame, const Rigid3& world_from_camera,
+                                        const Eigen::Vector2d& pixel, double depth_prior_m,
+                                        double depth_sigma_m) override;
+
+ private:
+  std::uint64_t generation_ = 0;
+};
+
+}  // namespace saccade

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "server/gl/gl_context.hpp"
+
+namespace saccade {
+
+/// HOST:PORT, HOST an IP literal (IPv6 in brackets) or localhost.
+struct Address {
+  std::string host = "127.0.0.1";  // without brackets
+  int port = 0;                    // 0: any free one
+
+  /// InvalidArgument names `flag`.
+  static absl::StatusOr<Address> Parse(const std::string& text, const std::string& flag);
+  bool loopback() const;
+  std::string ToString(int actual_port) const;
+};
+
+/// What saccade-server was asked to do. The command line wins over --config FILE.toml.
+struct ServerConfig {
+  std::string source;
+  std::string mount = "none";
+  std::filesystem::path data_dir;
+  std::filesystem::path camera_file;
+  Address grpc{"127.0.0.1", 50051};
+  Address http{"127.0.0.1", 8080};
+  bool insecure = false;
+  GlBackend gl = GlBackend::kOsmesa;
+  bool every_frame = false;  // --speed max
+  std::optional<double> run_for_s;
+  std::filesystem::path sim_truth;
+  // Only in the file: reasons to change them are rare.
+  int video_bit_rate_bit_s = 0;       // video.bit_rate_bit_s; 0: by picture size
+  std::filesystem::path web_root;     // web_root
+  std::uint64_t seed = 1;             // seed
+  std::filesystem::path config_file;  // its [tracker] table is the tracker's to read; may be empty
+
+  /// Parses the command line. An error is bad usage (exit 2); `--help` and `--version` print and
+  /// give nothing.
+  static absl::StatusOr<std::optional<ServerConfig>> FromCommandLine(int argc, char** argv);
+};
+
+inline constexpr char kVersion[] = "0.1.0";
+
+}  // namespace saccade

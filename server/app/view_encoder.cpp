@@ -1,0 +1,93 @@
+#include "server/app/view_encoder.hpp"
+
+#include <cstdio>
+
+namespace saccade {
+namespace {
+
+constexpr Timestamp kKeyFrameInterval = 250'000'000;
+constexpr Timestamp kIdle = 250'000'000;  // no frame for so long: the source stands still
+
+}  // namespace
+
+ViewEncoder::ViewEncoder(VideoView view, int bit_rate_bit_s, DrawView draw, EventSink& sink)
+    : view_(view),
+      bit_rate_bit_s_(bit_rate_bit_s),
+      draw_(std::move(draw)),
+      sink_(sink),
+      runner_({.capacity = 1, .when_full = WhenFull::kDropOldest},
+              [this](const TrackedFrame& frame) { Step(frame); }) {}
+
+void ViewEncoder::Post(TrackedFrame frame) {
+  {
+    const std::lock_guard lock(mutex_);
+    last_ = frame;
+    posted_ns_ = MonotonicNow();
+  }
+  if (wanted_) runner_.Post(std::move(frame)).IgnoreError();  // stopped: nobody watches
+}
+
+void ViewEncoder::SetDemand(bool wanted) {
+  if (wanted && !wanted_.exchange(true)) RequestKeyFrame();
+  wanted_ = wanted;
+}
+
+void ViewEncoder::RequestKeyFrame() {
+  key_requested_ = true;
+  std::optional<TrackedFrame> again;
+  {
+    const std::lock_guard lock(mutex_);
+    if (last_ && MonotonicNow() - posted_ns_ > kIdle) again = last_;
+  }
+  if (again) runner_.Post(*std::move(again)).IgnoreError();
+}
+
+bool ViewEncoder::TakeKeyFrameRequest(Timestamp now_ns) {
+  if (!key_requested_ || now_ns - key_ns_ < kKeyFrameInterval) return false;
+  key_requested_ = false;
+  key_ns_ = now_ns;
+  return true;
+}
+
+absl::Status ViewEncoder::Prepare(const cv::Mat& picture, const TrackedFrame& frame) {
+  if (encoder_ != nullptr) return absl::OkStatus();
+  VideoEncoderOptions options;
+  options.width = picture.cols;
+  options.height = picture.rows;
+  options.fps_hz = frame.tracked.camera->intrinsics().fps;
+  options.bit_rate_bit_s = bit_rate_bit_s_;
+  absl::StatusOr<std::unique_ptr<VideoEncoder>> encoder = VideoEncoder::Create(options);
+  if (!encoder.ok()) return encoder.status();
+  encoder_ = *std::move(encoder);
+  return absl::OkStatus();
+}
+
+void ViewEncoder::Step(const TrackedFrame& frame) {
+  const Timestamp begin_ns = MonotonicNow();
+  const cv::Mat picture = draw_(frame);
+  absl::Status status = Prepare(picture, frame);
+  absl::StatusOr<EncodedPicture> coded = status;
+  if (status.ok()) coded = encoder_->Encode(picture, TakeKeyFrameRequest(begin_ns));
+  if (!coded.ok()) {
+    if (!failed_) std::fprintf(stderr, "video: %s\n", coded.status().ToString().c_str());
+    failed_ = true;
+    return;
+  }
+  failed_ = false;
+  auto packet = std::make_shared<VideoPacket>();
+  packet->view = view_;
+  packet->sequence = ++sequence_;
+  packet->key_frame = coded->key_frame;
+  packet->temporal_layer = coded->temporal_layer;
+  packet->data = coded->data;
+  packet->width = encoder_->coded_width();
+  packet->height = encoder_->coded_height();
+  packet->tracked = frame.tracked;
+  const Timestamp end_ns = MonotonicNow();
+  packet->tracked.stages.encoded_ns = end_ns;
+  milliseconds_.Add(end_ns, 1e-6 * static_cast<double>(end_ns - begin_ns));
+  bits_.Add(end_ns, 8.0 * static_cast<double>(coded->data->size()));
+  sink_.OnVideo(packet);
+}
+
+}  // namespace saccade

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "server/capture/frame.hpp"
+#include "server/encode/video_encoder.hpp"
+#include "server/pipeline/events.hpp"
+#include "server/pipeline/rolling_statistics.hpp"
+#include "server/pipeline/runner.hpp"
+
+namespace saccade {
+
+/// A frame with all that is known of it, on its way to the encoder.
+struct TrackedFrame {
+  std::shared_ptr<const Frame> frame;
+  TrackedEvent tracked;
+};
+
+/// The picture of one view. Any thread.
+using DrawView = std::function<cv::Mat(const TrackedFrame&)>;
+
+/// Draws and codes one view on a thread of its own, once for all who watch and only while somebody
+/// does. A frame that finds the encoder busy replaces the one that waits.
+class ViewEncoder {
+ public:
+  /// `sink` hears of each packet on the encoder's thread. `bit_rate_bit_s` 0: the encoder's
+  /// default.
+  ViewEncoder(VideoView view, int bit_rate_bit_s, DrawView draw, EventSink& sink);
+  ~ViewEncoder() { Stop(); }
+  void Stop() { runner_.Stop(); }
+
+  // Any thread; none blocks.
+  void Post(TrackedFrame frame);
+  void SetDemand(bool wanted);
+  /// The next picture becomes a key frame, at most four times a second; if no frame comes, because
+  /// the source ended or stands still, the last one is coded again.
+  void RequestKeyFrame();
+
+  RollingStatistics::Summary milliseconds() const { return milliseconds_.At(MonotonicNow()); }
+  double bit_rate_bit_s() const { return bits_.At(MonotonicNow()).sum_per_second; }
+
+ private:
+  void Step(const TrackedFrame& frame);
+  bool TakeKeyFrameRequest(Timestamp now_ns);
+  absl::Status Prepare(const cv::Mat& picture, const TrackedFrame& frame);
+
+  const VideoView view_;
+  const int bit_rate_bit_s_;
+  const DrawView draw_;
+  EventSink& sink_;
+  RollingStatistics milliseconds_;  // to draw and code one picture
+  RollingStatistics bits_;
+  std::atomic<bool> wanted_ = false;
+  std::atomic<bool> key_requested_ = false;
+
+  std::mutex mutex_;
+  std::optional<TrackedFrame> last_;  // posted, coded or not
+  Timestamp posted_ns_ = 0;
+
+  // The runner's thread only.
+  std::unique_ptr<VideoEncoder> encoder_;
+  std::uint64_t sequence_ = 0;
+  Timestamp key_ns_ = 0;
+  bool failed_ = false;  // said so once
+
+  Runner<TrackedFrame> runner_;  // last
+};
+
+}  // namespace saccade
