@@ -1,0 +1,74 @@
+import js from '@eslint/js';
+import tseslint from 'typescript-eslint';
+
+/** Folders may import only what is listed: data flows from transport to ui (see README.md). */
+const layers = {
+  geometry: ['scene', 'tools', 'ui', 'session', 'transport', 'decode'],
+  transport: ['scene', 'tools', 'ui', 'session', 'decode'],
+  decode: ['scene', 'tools', 'ui', 'session', 'transport'],
+  session: ['scene', 'tools', 'ui'],
+  tools: ['scene', 'ui', 'transport'],
+  scene: ['ui', 'transport'],
+};
+
+export default tseslint.config(
+  { ignores: ['dist', 'src/gen', 'node_modules'] },
+  js.configs.recommended,
+  {
+    files: ['src/**/*.ts', 'test/unit/**/*.ts'],
+    extends: [...tseslint.configs.strictTypeChecked],
+    languageOptions: {
+      parserOptions: { projectService: true, tsconfigRootDir: import.meta.dirname },
+    },
+    rules: {
+      '@typescript-eslint/restrict-template-expressions': [
+        'error',
+        { allowNumber: true, allowBoolean: true },
+      ],
+      '@typescript-eslint/no-confusing-void-expression': [
+        'error',
+        { ignoreArrowShorthand: true, ignoreVoidReturningFunctions: true },
+      ],
+      '@typescript-eslint/switch-exhaustiveness-check': [
+        'error',
+        { considerDefaultExhaustiveForUnions: true },
+      ],
+      'max-lines': ['error', 300],
+    },
+  },
+  ...Object.entries(layers).map(([folder, forbidden]) => ({
+    files: [`src/${folder}/**/*.ts`],
+    rules: {
+      'no-restricted-imports': [
+        'error',
+        {
+          patterns: [
+            ...forbidden.map((name) => ({
+              group: [`../${name}/*`],
+              message: `${folder} must not see ${name}`,
+            })),
+            ...(['geometry', 'session', 'transport', 'decode', 'tools'].includes(folder)
+              ? [{ group: ['three', 'three/*'], message: 'three.js belongs to scene' }]
+              : []),
+          ],
+        },
+      ],
+    },
+  })),
+  {
+    files: ['scripts/**/*.mjs', 'test/browser/**/*.mjs', '*.js', '*.ts'],
+    languageOptions: {
+      globals: {
+        console: 'readonly',
+        process: 'readonly',
+        setTimeout: 'readonly',
+        clearTimeout: 'readonly',
+        performance: 'readonly',
+        URL: 'readonly',
+        Buffer: 'readonly',
+        document: 'readonly',
+        window: 'readonly',
+      },
+    },
+  },
+);

@@ -1,0 +1,162 @@
+import * as THREE from 'three';
+import { threeFromWorld, threeOrientation } from '../geometry/axes';
+import { Camera } from '../geometry/camera';
+import type { Rigid3 } from '../geometry/rigid3';
+import { distance, type Vec3 } from '../geometry/vec3';
+import { makeView, type View } from '../geometry/view';
+import type { Session } from '../session/session';
+import { FeatureCloud } from './feature_cloud';
+import { Frustum } from './frustum';
+import { groundGrid } from './ground_grid';
+import { OrbitCamera } from './orbit';
+import { PathLine } from './path_line';
+
+const FIELD_OF_VIEW_DEG = 45;
+
+/** The picture shown and where it was taken from. */
+export interface ShownFrame {
+  readonly frameId: number;
+  readonly camera: Camera;
+  readonly worldFromCamera: Rigid3;
+}
+
+/** The 3D map: features, the wearer's camera with its picture, its path. Marks go on top, in 2D. */
+export class MapView {
+  readonly orbit = new OrbitCamera();
+  following = false;
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly scene = new THREE.Scene();
+  private readonly eye = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 1000);
+  private readonly cloud = new FeatureCloud();
+  private readonly path = new PathLine();
+  private readonly frustum: Frustum;
+  private width = 0; // CSS px
+  private height = 0;
+  private framed: { centre: Vec3; radius: number } | undefined;
+  private held = false; // by hand: no more framing by itself
+  private lastMs = 0;
+  private shownFrame = -1;
+  private dirty = true;
+
+  constructor(
+    canvas: HTMLCanvasElement,
+    picture: HTMLCanvasElement,
+    private readonly session: Session,
+  ) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer.setClearColor('#131415');
+    this.frustum = new Frustum(picture);
+    this.scene.add(groundGrid(), this.cloud.object, this.path.object, this.frustum.object);
+  }
+
+  resize(width: number, height: number): void {
+    if (width === this.width && height === this.height) return;
+    this.width = width;
+    this.height = height;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.eye.aspect = width / Math.max(height, 1);
+    this.eye.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  /** From now on the view moves only by hand. */
+  hold(): void {
+    this.held = true;
+    this.dirty = true;
+  }
+
+  /** Brings the whole map into view. */
+  frameAll(): void {
+    this.following = false;
+    const bounds = this.bounds();
+    if (bounds) this.orbit.lookAt(bounds.centre, bounds.radius);
+    this.dirty = true;
+  }
+
+  /** The eye, in CSS pixels of this view. */
+  view(): View {
+    const f = this.height / 2 / Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    const camera = new Camera({
+      model: 'pinhole',
+      width: this.width,
+      height: this.height,
+      fx: f,
+      fy: f,
+      cx: this.width / 2 - 0.5,
+      cy: this.height / 2 - 0.5,
+      distortion: [],
+    });
+    return makeView(camera, this.orbit.worldFromCamera());
+  }
+
+  /** Draws if anything changed; true if so. */
+  draw(nowMs: number, shown: ShownFrame | undefined): boolean {
+    const elapsed = Math.min(nowMs - this.lastMs, 100);
+    this.lastMs = nowMs;
+    if (this.cloud.update(this.session.map)) this.dirty = true;
+    if (this.path.update(this.session.path)) this.dirty = true;
+    this.updateFrustum(shown);
+    this.steer(shown);
+    if (this.orbit.step(elapsed)) this.dirty = true;
+    if (!this.dirty || this.width === 0) return false;
+    this.dirty = false;
+    const pose = this.orbit.worldFromCamera();
+    const p = threeFromWorld(pose.translation);
+    const q = threeOrientation(pose);
+    this.eye.position.set(p.x, p.y, p.z);
+    this.eye.quaternion.set(q.x, q.y, q.z, q.w);
+    this.renderer.render(this.scene, this.eye);
+    return true;
+  }
+
+  private updateFrustum(shown: ShownFrame | undefined): void {
+    if (!shown) {
+      if (this.frustum.object.visible) this.dirty = true;
+      this.frustum.hide();
+      this.shownFrame = -1;
+    } else if (shown.frameId !== this.shownFrame) {
+      this.shownFrame = shown.frameId;
+      const depth = this.framed ? this.framed.radius * 0.3 : 0.2;
+      this.frustum.show(shown.camera, shown.worldFromCamera, depth);
+      this.dirty = true;
+    }
+  }
+
+  /** Follows the wearer where asked to; frames the map by itself until someone takes hold. */
+  private steer(shown: ShownFrame | undefined): void {
+    if (this.following && shown) {
+      this.orbit.follow(shown.worldFromCamera.translation);
+      return;
+    }
+    if (this.held) return;
+    const bounds = this.bounds();
+    if (!bounds) return;
+    const { framed } = this;
+    const moved = framed ? distance(bounds.centre, framed.centre) / framed.radius : Infinity;
+    const grown = framed ? Math.abs(Math.log(bounds.radius / framed.radius)) : Infinity;
+    if (moved < 0.3 && grown < 0.3) return;
+    this.framed = bounds;
+    this.orbit.lookAt(bounds.centre, bounds.radius);
+  }
+
+  /** A sphere round most features and the camera; stray ones do not count. */
+  private bounds(): { centre: Vec3; radius: number } | undefined {
+    const features = [...this.session.map.features.values()];
+    const sure = features.filter((feature) => feature.depthKnown);
+    const points = (sure.length >= 4 ? sure : features).map((feature) => feature.pointInWorld);
+    if (points.length < 4) return undefined;
+    const middle = (values: number[]): number =>
+      values.sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? 0;
+    const centre = {
+      x: middle(points.map((p) => p.x)),
+      y: middle(points.map((p) => p.y)),
+      z: middle(points.map((p) => p.z)),
+    };
+    const spread = points.map((p) => distance(p, centre)).sort((a, b) => a - b);
+    const most = spread[Math.floor(spread.length * 0.85)] ?? 1;
+    const eye = this.session.pose?.worldFromCamera.translation;
+    const radius = Math.max(most, eye ? Math.min(distance(eye, centre), 3 * most) : 0, 0.1);
+    return { centre, radius };
+  }
+}

@@ -1,0 +1,63 @@
+import type { AnnotationEvent } from '../gen/saccade/v1/session_pb';
+import { toAnnotation } from './convert';
+import type { Annotation, PendingAnnotation } from './types';
+
+/** The server's annotations, with what this page has asked for and not heard back of. */
+export class AnnotationBook {
+  private readonly known = new Map<string, Annotation>();
+  private readonly pending = new Map<string, PendingAnnotation>();
+  private readonly leaving = new Set<string>();
+  /** Rises with every change. */
+  version = 0;
+
+  apply(event: AnnotationEvent): void {
+    if (event.full) this.known.clear();
+    for (const pb of event.upserted) this.known.set(pb.id, toAnnotation(pb));
+    for (const id of event.removedIds) {
+      this.known.delete(id);
+      this.leaving.delete(id);
+    }
+    ++this.version;
+  }
+
+  /** The answer to a request of ours, usually ahead of the stream's. */
+  put(annotation: Annotation): void {
+    this.known.set(annotation.id, annotation);
+    ++this.version;
+  }
+
+  /** Oldest first, without those being deleted. */
+  list(): Annotation[] {
+    return [...this.known.values()]
+      .filter(({ id }) => !this.leaving.has(id))
+      .sort((a, b) => a.createdMs - b.createdMs || a.id.localeCompare(b.id));
+  }
+
+  get(id: string): Annotation | undefined {
+    return this.leaving.has(id) ? undefined : this.known.get(id);
+  }
+
+  pendingList(): PendingAnnotation[] {
+    return [...this.pending.values()];
+  }
+
+  addPending(pending: PendingAnnotation): void {
+    this.pending.set(pending.requestId, pending);
+    ++this.version;
+  }
+
+  removePending(requestId: string): void {
+    this.pending.delete(requestId);
+    ++this.version;
+  }
+
+  /** Hides an annotation while its deletion is under way; `undo` shows it again. */
+  hide(id: string): () => void {
+    this.leaving.add(id);
+    ++this.version;
+    return () => {
+      this.leaving.delete(id);
+      ++this.version;
+    };
+  }
+}

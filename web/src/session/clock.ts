@@ -1,0 +1,39 @@
+interface Sample {
+  readonly offsetMs: number;
+  readonly roundTripMs: number;
+}
+
+/** Offset of the server's clock from this page's, from pings as in NTP: the quickest of the last 8. */
+export class ClockOffset {
+  private samples: Sample[] = [];
+
+  /** All times in ms; t0 and t3 on this page's clock, t1 and t2 on the server's. */
+  add(t0: number, t1: number, t2: number, t3: number): void {
+    this.samples.push({ offsetMs: (t1 - t0 + (t2 - t3)) / 2, roundTripMs: t3 - t0 - (t2 - t1) });
+    if (this.samples.length > 8) this.samples.shift();
+  }
+
+  /** Server time = page time + this; undefined before the first ping. */
+  get offsetMs(): number | undefined {
+    return this.best?.offsetMs;
+  }
+
+  get roundTripMs(): number | undefined {
+    return this.best?.roundTripMs;
+  }
+
+  reset(): void {
+    this.samples = [];
+  }
+
+  private get best(): Sample | undefined {
+    let best: Sample | undefined;
+    for (const sample of this.samples) {
+      if (!best || sample.roundTripMs < best.roundTripMs) best = sample;
+    }
+    return best;
+  }
+}
+
+/** This page's clock [ms], the same in its workers. */
+export const pageNowMs = (): number => performance.timeOrigin + performance.now();

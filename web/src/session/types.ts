@@ -1,0 +1,122 @@
+import type { Camera } from '../geometry/camera';
+import type { Covariance3 } from '../geometry/covariance';
+import type { Rigid3 } from '../geometry/rigid3';
+import type { Pixel, Vec3 } from '../geometry/vec3';
+
+export type TrackingStatus =
+  | 'unknown'
+  | 'initialising'
+  | 'tracking'
+  | 'coasting'
+  | 'lost'
+  | 'relocalising';
+export type Quality = 'unknown' | 'bad' | 'poor' | 'good';
+export type FeatureState = 'not_attempted' | 'measured' | 'failed';
+export type AnchorState = 'provisional' | 'tracking' | 'paused' | 'stopped';
+export type Shape = 'cube' | 'note' | 'arrow' | 'ink';
+export type Role = 'expert' | 'wearer' | 'viewer';
+export type View = 'raw' | 'augmented';
+
+/** The camera at one frame. Frame ids fit a number: 2^53 frames are nine million years. */
+export interface Pose {
+  readonly frameId: number;
+  readonly status: TrackingStatus;
+  readonly quality: Quality;
+  readonly advice: string;
+  readonly metric: boolean;
+  readonly worldFromCamera: Rigid3;
+  readonly attempted: number;
+  readonly matched: number;
+  readonly mapRevision: number;
+}
+
+/** Server's monotonic clock [ms]; 0: stage not run. */
+export interface Stages {
+  readonly captured: number;
+  readonly received: number;
+  readonly tracked: number;
+  readonly encoded: number;
+  readonly queued: number;
+}
+
+/** What is known of a frame before its picture is decoded: everything but the picture. */
+export interface FrameFacts {
+  readonly frameId: number;
+  readonly view: View;
+  readonly pose: Pose | undefined;
+  readonly camera: Camera;
+  readonly stages: Stages;
+  readonly arrivedMs: number; // this page's clock, performance.timeOrigin + now()
+}
+
+export interface Feature {
+  readonly id: number;
+  readonly state: FeatureState;
+  readonly pointInWorld: Vec3;
+  readonly covariance: Covariance3 | undefined;
+  readonly depthKnown: boolean;
+  readonly pixel: Pixel | undefined;
+  readonly matchedCount: number;
+}
+
+export interface Anchor {
+  readonly state: AnchorState;
+  readonly pointInWorld: Vec3;
+  readonly covariance: Covariance3 | undefined;
+  readonly errorMm: number;
+  readonly errorPx: number | undefined;
+  readonly reason: string;
+}
+
+export interface Annotation {
+  readonly id: string;
+  readonly shape: Shape;
+  readonly text: string;
+  readonly author: string;
+  readonly sizeM: number;
+  readonly colorRgba: number;
+  readonly createdMs: number;
+  readonly anchor: Anchor;
+  readonly inkOffsetsM: readonly Vec3[];
+}
+
+/** A mark made here that the server has not answered yet. */
+export interface PendingAnnotation {
+  readonly requestId: string;
+  readonly shape: Shape;
+  readonly text: string;
+  readonly pointInWorld: Vec3 | undefined; // our own estimate until the server's
+  readonly sizeM: number;
+}
+
+export interface Participant {
+  readonly sessionId: string;
+  readonly name: string;
+  readonly role: Role;
+}
+
+export interface Statistics {
+  readonly capturedFps: number;
+  readonly trackedFps: number;
+  readonly encodedFps: number;
+  readonly framesDropped: number;
+  readonly badFrames: number;
+  readonly eventsSkipped: number;
+  readonly videoBitRate: number;
+}
+
+export type Target =
+  | { readonly kind: 'pixel'; readonly frameId: number; readonly pixel: Pixel }
+  | { readonly kind: 'feature'; readonly featureId: number }
+  | { readonly kind: 'point'; readonly pointInWorld: Vec3 }
+  | { readonly kind: 'ray'; readonly originInWorld: Vec3; readonly directionInWorld: Vec3 };
+
+export type Link =
+  | { readonly kind: 'connecting' }
+  | { readonly kind: 'live' }
+  | { readonly kind: 'reconnecting'; readonly reason: string; readonly sinceMs: number }
+  | { readonly kind: 'refused'; readonly reason: string };
+
+/** An anchor whose place is not to be relied upon (drawn hollow and named so). */
+export const doNotTrust = (anchor: Anchor): boolean =>
+  anchor.state === 'paused' || anchor.state === 'stopped';

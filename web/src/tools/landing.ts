@@ -1,0 +1,148 @@
+import { largestSigma } from '../geometry/covariance';
+import { fitPlane, intersect } from '../geometry/plane';
+import { add, distance, dot, pixelDistance, type Pixel, scale, type Vec3 } from '../geometry/vec3';
+import { depthOf, eyeOf, projectPoint, rayOf, type View } from '../geometry/view';
+import type { Feature, Target } from '../session/types';
+
+/** Where a click would land, as far as this page can tell before the server decides. */
+export interface Landing {
+  readonly target: Target;
+  readonly pointInWorld: Vec3;
+  readonly sigmaM: number | undefined; // undefined: nothing known about the depth
+  readonly depthM: number;
+  readonly how: 'feature' | 'plane' | 'nearby depth' | 'unknown depth';
+}
+
+const FEATURE_PX = 20; // as the server's (slam-spec section 9)
+const NEAR_PX = 120;
+const PLANE_RESIDUAL_M = 0.02;
+const GUESSED_DEPTH_M = 1;
+
+interface Seen {
+  readonly feature: Feature;
+  readonly pixel: Pixel;
+  readonly depthM: number;
+  readonly away: number; // from the click [px]
+}
+
+/** A click on the video: the pixel of the frame that is on the screen. */
+export function landingInVideo(
+  view: View,
+  frameId: number,
+  pixel: Pixel,
+  features: Iterable<Feature>,
+): Landing | undefined {
+  const guess = guessAt(view, pixel, seenFrom(view, pixel, features));
+  return guess && { ...guess, target: { kind: 'pixel', frameId, pixel } };
+}
+
+/** A click on the map: a feature where one is close enough, else the ray into the scene. */
+export function landingInMap(
+  view: View,
+  pixel: Pixel,
+  features: Iterable<Feature>,
+): Landing | undefined {
+  const seen = seenFrom(view, pixel, features);
+  const direction = rayOf(view, pixel);
+  const guess = guessAt(view, pixel, seen);
+  if (!guess || !direction || seen.length === 0) return undefined; // nothing mapped there
+  const nearest = seen[0];
+  if (guess.how === 'feature' && nearest) {
+    return { ...guess, target: { kind: 'feature', featureId: nearest.feature.id } };
+  }
+  const origin = eyeOf(view);
+  return {
+    ...guess,
+    target: { kind: 'ray', originInWorld: origin, directionInWorld: direction },
+  };
+}
+
+/** Features in front of the eye, nearest to the click first. */
+function seenFrom(view: View, click: Pixel, features: Iterable<Feature>): Seen[] {
+  const seen: Seen[] = [];
+  for (const feature of features) {
+    if (!feature.depthKnown) continue;
+    const pixel = projectPoint(view, feature.pointInWorld);
+    if (!pixel) continue;
+    const depthM = depthOf(view, feature.pointInWorld);
+    seen.push({ feature, pixel, depthM, away: pixelDistance(pixel, click) });
+  }
+  return seen.sort((a, b) => a.away - b.away);
+}
+
+const sigmaOf = ({ feature }: Seen): number =>
+  feature.covariance ? largestSigma(feature.covariance) : 0;
+
+const median = (values: number[]): number =>
+  values.sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? 0;
+
+function guessAt(
+  view: View,
+  pixel: Pixel,
+  seen: readonly Seen[],
+): Omit<Landing, 'target'> | undefined {
+  const direction = rayOf(view, pixel);
+  if (!direction) return undefined;
+  const nearest = seen[0];
+  if (nearest && nearest.away <= FEATURE_PX) {
+    const { feature, depthM } = nearest;
+    return { pointInWorld: feature.pointInWorld, sigmaM: sigmaOf(nearest), depthM, how: 'feature' };
+  }
+  return (
+    onPlane(view, direction, seen) ??
+    atDepth(view, direction, seen) ?? {
+      pointInWorld: add(eyeOf(view), scale(direction, GUESSED_DEPTH_M)),
+      sigmaM: undefined,
+      depthM: GUESSED_DEPTH_M,
+      how: 'unknown depth',
+    }
+  );
+}
+
+function onPlane(
+  view: View,
+  direction: Vec3,
+  seen: readonly Seen[],
+): Omit<Landing, 'target'> | undefined {
+  const near = seen.filter(({ away }) => away <= NEAR_PX).slice(0, 6);
+  const plane = fitPlane(near.map(({ feature }) => feature.pointInWorld));
+  if (!plane || plane.residual > PLANE_RESIDUAL_M) return undefined;
+  const point = intersect(plane, eyeOf(view), direction);
+  if (!point) return undefined;
+  const depthM = depthOf(view, point);
+  const around = median(near.map((entry) => entry.depthM));
+  if (!(depthM > around / 2 && depthM < around * 2)) return undefined; // seen too much edge-on
+  // A slanted plane carries its error along the ray.
+  const slant = Math.max(Math.abs(dot(direction, plane.normal)), 0.1);
+  const sigmaM = Math.hypot(plane.residual, median(near.map(sigmaOf))) / slant;
+  return { pointInWorld: point, sigmaM, depthM, how: 'plane' };
+}
+
+function atDepth(
+  view: View,
+  direction: Vec3,
+  seen: readonly Seen[],
+): Omit<Landing, 'target'> | undefined {
+  if (seen.length === 0) return undefined;
+  const depthM = median(seen.slice(0, 12).map((entry) => entry.depthM));
+  const eye = eyeOf(view);
+  const ahead = add(eye, direction);
+  const point = add(eye, scale(direction, (depthM * distance(ahead, eye)) / depthOf(view, ahead)));
+  return { pointInWorld: point, sigmaM: 0.3 * depthM, depthM, how: 'nearby depth' };
+}
+
+/** Radius [px] of the ring that stands for the uncertainty; undefined: unknown. */
+export function ringRadius(view: View, landing: Landing): number | undefined {
+  if (landing.sigmaM === undefined) return undefined;
+  const { fx, fy } = view.camera.intrinsics;
+  return (landing.sigmaM / landing.depthM) * ((fx + fy) / 2);
+}
+
+/** In words, for beside the ring. */
+export function landingWords(landing: Landing): string {
+  const { sigmaM, how } = landing;
+  if (sigmaM === undefined) return 'depth unknown';
+  const size =
+    sigmaM < 0.0095 ? `${(sigmaM * 1000).toFixed(0)} mm` : `${(sigmaM * 100).toFixed(0)} cm`;
+  return how === 'nearby depth' ? `±${size}, depth guessed` : `±${size}`;
+}

@@ -1,0 +1,70 @@
+import type { Shape } from '../session/types';
+
+export type ToolName = 'select' | 'cube' | 'note' | 'arrow';
+export type CommandName = 'undo' | 'redo' | 'delete' | 'swap' | 'follow' | 'frame' | 'reset';
+
+export interface Control<Name extends string> {
+  readonly name: Name;
+  readonly label: string;
+  readonly key: string; // as KeyboardEvent.key, lower case
+  readonly shown: string; // on the button
+  readonly hint: string;
+}
+
+/** What a click in the video or the map does. One key each. */
+export const TOOLS: readonly Control<ToolName>[] = [
+  { name: 'select', label: 'Select', key: 'v', shown: 'V', hint: 'click a mark to select it' },
+  { name: 'cube', label: 'Cube', key: 'c', shown: 'C', hint: 'click to place a 5 cm cube' },
+  { name: 'note', label: 'Note', key: 'n', shown: 'N', hint: 'click to place a note, then type' },
+  { name: 'arrow', label: 'Arrow', key: 'a', shown: 'A', hint: 'click to place an arrow' },
+];
+
+/** What happens at once. */
+export const COMMANDS: readonly Control<CommandName>[] = [
+  { name: 'undo', label: 'Undo', key: 'z', shown: 'Z', hint: 'take back your last change' },
+  { name: 'redo', label: 'Redo', key: 'y', shown: 'Y', hint: 'do it again' },
+  {
+    name: 'delete',
+    label: 'Delete',
+    key: 'delete',
+    shown: 'Del',
+    hint: 'delete the selected mark',
+  },
+  { name: 'swap', label: 'Swap', key: 's', shown: 'S', hint: 'swap the map and the video' },
+  { name: 'follow', label: 'Follow', key: 'f', shown: 'F', hint: 'keep the wearer in view' },
+  {
+    name: 'frame',
+    label: 'Whole map',
+    key: 'h',
+    shown: 'H',
+    hint: 'bring the whole map into view',
+  },
+  {
+    name: 'reset',
+    label: 'Reset map',
+    key: 'r',
+    shown: 'R',
+    hint: 'forget the map and start anew',
+  },
+];
+
+export const shapeOf = (tool: ToolName): Shape | undefined =>
+  tool === 'select' ? undefined : tool;
+
+/** The tool or command of a key press; nothing while typing or with Ctrl, Alt, Meta. */
+export function controlOf(event: {
+  readonly key: string;
+  readonly ctrlKey: boolean;
+  readonly altKey: boolean;
+  readonly metaKey: boolean;
+  readonly shiftKey: boolean;
+}): ToolName | CommandName | undefined {
+  const key = event.key.toLowerCase();
+  if (event.altKey) return undefined;
+  if (event.ctrlKey || event.metaKey) {
+    if (key === 'z') return event.shiftKey ? 'redo' : 'undo';
+    return key === 'y' ? 'redo' : undefined;
+  }
+  if (key === 'backspace') return 'delete';
+  return [...TOOLS, ...COMMANDS].find((control) => control.key === key)?.name;
+}

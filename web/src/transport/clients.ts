@@ -1,0 +1,21 @@
+import { type Client, createClient } from '@connectrpc/connect';
+import { createGrpcWebTransport } from '@connectrpc/connect-web';
+import { AnnotationService } from '../gen/saccade/v1/annotation_pb';
+import { MapService } from '../gen/saccade/v1/map_pb';
+import { SessionService } from '../gen/saccade/v1/session_pb';
+
+export interface Clients {
+  readonly session: Client<typeof SessionService>;
+  readonly annotations: Client<typeof AnnotationService>;
+  readonly map: Client<typeof MapService>;
+}
+
+/** gRPC-Web to the server that this page came from. */
+export function createClients(baseUrl: string): Clients {
+  const transport = createGrpcWebTransport({ baseUrl, useBinaryFormat: true });
+  return {
+    session: createClient(SessionService, transport),
+    annotations: createClient(AnnotationService, transport),
+    map: createClient(MapService, transport),
+  };
+}

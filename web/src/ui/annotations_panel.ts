@@ -1,0 +1,134 @@
+import type { Annotation } from '../session/types';
+import type { Session } from '../session/session';
+import type { AppState } from './app_state';
+import { h, icon, setClass, setText } from './dom';
+import { ICONS } from './icons';
+import { anchorWords } from './words';
+
+export interface AnnotationActions {
+  select(id: string): void;
+  remove(id: string): void;
+  /** Empty `text` keeps the note as it is. */
+  finishEditing(id: string, text: string | undefined): void;
+  startEditing(id: string): void;
+}
+
+interface Row {
+  readonly element: HTMLElement;
+  readonly title: HTMLElement;
+  readonly state: HTMLElement;
+  readonly button: HTMLElement;
+  editor: HTMLFormElement | undefined;
+}
+
+/** Every annotation with its state and live error. */
+export class AnnotationsPanel {
+  readonly element: HTMLElement;
+  private readonly count = h('span', { class: 'number' });
+  private readonly list = h('ul', {});
+  private readonly empty = h(
+    'p',
+    { class: 'empty' },
+    'None yet. Choose a cube (C), note (N) or arrow (A), then click in the map or the video.',
+  );
+  private readonly rows = new Map<string, Row>();
+
+  constructor(
+    private readonly session: Session,
+    private readonly state: AppState,
+    private readonly actions: AnnotationActions,
+  ) {
+    this.element = h(
+      'aside',
+      { 'aria-label': 'Annotations' },
+      h('h2', {}, 'Annotations', this.count),
+      this.empty,
+      this.list,
+    );
+  }
+
+  update(): void {
+    const annotations = this.session.annotations.list();
+    setText(this.count, String(annotations.length));
+    setClass(this.empty, 'hidden', annotations.length > 0);
+    const present = new Set(annotations.map(({ id }) => id));
+    for (const [id, row] of this.rows) {
+      if (present.has(id)) continue;
+      row.element.remove();
+      this.rows.delete(id);
+    }
+    for (const annotation of annotations) this.updateRow(annotation);
+  }
+
+  private updateRow(annotation: Annotation): void {
+    const row = this.rows.get(annotation.id) ?? this.addRow(annotation);
+    const selected = annotation.id === this.state.selectedId;
+    const words = anchorWords(annotation, this.session.pose?.metric ?? true);
+    const refusal = this.state.refusal(`annotation ${annotation.id}`);
+    setText(row.title, annotation.text || annotation.shape);
+    setText(row.state, refusal ?? words.text);
+    setClass(row.element, 'warn', words.warn || refusal !== undefined);
+    if (selected && !row.element.classList.contains('selected')) {
+      row.element.scrollIntoView({ block: 'nearest' });
+    }
+    setClass(row.element, 'selected', selected);
+    row.button.setAttribute('aria-pressed', String(selected));
+    this.updateEditor(row, annotation);
+  }
+
+  private addRow(annotation: Annotation): Row {
+    const { id, shape, author } = annotation;
+    const title = h('span', { class: 'title' });
+    const state = h('span', { class: 'state number' });
+    const by = h('span', { class: 'by' }, author);
+    const button = h(
+      'button',
+      { class: 'pick', type: 'button', title: `${shape} by ${author}` },
+      icon(ICONS[shape === 'ink' ? 'arrow' : shape]),
+      h('span', { class: 'words' }, title, by, state),
+    );
+    button.addEventListener('click', () => this.actions.select(id));
+    button.addEventListener('dblclick', () => this.actions.startEditing(id));
+    const remove = h('button', { class: 'remove', type: 'button', title: 'Delete (Del)' });
+    remove.setAttribute('aria-label', `Delete ${shape}`);
+    remove.append(icon('M5.5 5.5l9 9M14.5 5.5l-9 9'));
+    remove.addEventListener('click', () => this.actions.remove(id));
+    const element = h('li', { 'data-id': id, 'data-shape': shape }, button, remove);
+    this.list.append(element);
+    const row: Row = { element, title, state, button, editor: undefined };
+    this.rows.set(id, row);
+    return row;
+  }
+
+  private updateEditor(row: Row, annotation: Annotation): void {
+    const wanted = this.state.editingId === annotation.id;
+    if (wanted === (row.editor !== undefined)) return;
+    if (!wanted) {
+      row.editor?.remove();
+      row.editor = undefined;
+      return;
+    }
+    const input = h('input', {
+      type: 'text',
+      maxlength: '160',
+      placeholder: 'what it says; Enter to keep',
+      'aria-label': 'Text of the note',
+    });
+    input.value = annotation.text;
+    const editor = h('form', { class: 'editor' }, input);
+    editor.addEventListener('submit', (event) => {
+      event.preventDefault();
+      this.actions.finishEditing(annotation.id, input.value.trim());
+    });
+    input.addEventListener('keydown', (event) => {
+      event.stopPropagation(); // letters are text here, not tools
+      if (event.key === 'Escape') this.actions.finishEditing(annotation.id, undefined);
+    });
+    input.addEventListener('blur', () => {
+      if (row.editor) this.actions.finishEditing(annotation.id, input.value.trim());
+    });
+    row.editor = editor;
+    row.element.append(editor);
+    input.focus();
+  }
+}

@@ -1,0 +1,94 @@
+import { Edits } from '../session/edits';
+import { LatencyMeter, RateMeter, stageTimes } from '../session/latency';
+import type { Session } from '../session/session';
+import { AnnotationsPanel } from './annotations_panel';
+import { AppState } from './app_state';
+import { Controller } from './controller';
+import { h } from './dom';
+import { Header } from './header';
+import { Help } from './help';
+import { handleKeys } from './keys';
+import { MapPane } from './map_pane';
+import type { Player } from './player';
+import { handleMapPointer, handleVideoPointer } from './pointer';
+import { Strip } from './strip';
+import { ToolsColumn } from './tools_column';
+import { VideoPane } from './video_pane';
+
+const PANEL_MS = 200; // moving numbers change five times a second: readable
+
+/** The expert's page: builds it, and draws it once per screen frame. */
+export class App {
+  readonly element: HTMLElement;
+  private readonly state = new AppState();
+  private readonly meter = new LatencyMeter();
+  private readonly screen = new RateMeter();
+  private readonly help = new Help();
+  private readonly header = new Header(this.help.button);
+  private readonly strip = new Strip();
+  private readonly map: MapPane;
+  private readonly video: VideoPane;
+  private readonly tools: ToolsColumn;
+  private readonly annotations: AnnotationsPanel;
+  private readonly stage = h('main', {});
+  private panelsMs = 0;
+  private panelsVersion = '';
+
+  constructor(
+    private readonly session: Session,
+    private readonly player: Player,
+  ) {
+    const { state } = this;
+    this.map = new MapPane(session, player, state);
+    this.video = new VideoPane(session, player, state);
+    const controller = new Controller(session, new Edits(session), state, this.map, this.video);
+    this.tools = new ToolsColumn(controller);
+    this.annotations = new AnnotationsPanel(session, state, controller);
+    this.stage.append(this.map.element, this.video.element);
+    this.element = h('div', { class: 'app' });
+    this.element.append(
+      this.header.element,
+      this.tools.element,
+      this.stage,
+      this.annotations.element,
+      this.strip.element,
+      this.help.dialog,
+    );
+    handleMapPointer(this.map, controller.mapGestures());
+    handleVideoPointer(this.video.element, controller.videoGestures());
+    handleKeys(controller, this.map, this.video, this.help);
+  }
+
+  start(): void {
+    void this.map.load();
+    requestAnimationFrame((nowMs) => this.frame(nowMs));
+  }
+
+  private frame(nowMs: number): void {
+    requestAnimationFrame((next) => this.frame(next));
+    this.screen.add(nowMs);
+    const { state, session, player } = this;
+    this.stage.dataset['main'] = state.main;
+    if (player.draw()) this.measure();
+    this.video.draw();
+    this.map.draw(nowMs);
+    state.expire(nowMs);
+    const version = `${state.version} ${session.annotations.version} ${session.link.kind}`;
+    if (version === this.panelsVersion && nowMs - this.panelsMs < PANEL_MS) return;
+    this.panelsVersion = version;
+    this.panelsMs = nowMs;
+    this.element.dataset['link'] = session.link.kind;
+    this.header.update(session, player, this.meter);
+    this.strip.update(session, this.meter, this.screen.rate(nowMs));
+    this.tools.update(state, this.map.map?.following ?? false);
+    this.annotations.update();
+  }
+
+  private measure(): void {
+    const { shown } = this.player;
+    if (!shown) return;
+    const { facts, decodedMs, drawnMs } = shown;
+    const times = stageTimes(facts, decodedMs, drawnMs, this.session.clock.offsetMs);
+    if (times) this.meter.add(times);
+  }
+}

@@ -1,0 +1,232 @@
+import type { Pixel } from '../geometry/vec3';
+import type { View } from '../geometry/view';
+import { EditError, type Edits } from '../session/edits';
+import type { Session } from '../session/session';
+import type { Annotation } from '../session/types';
+import { type Landing, landingInMap, landingInVideo } from '../tools/landing';
+import { pickNearest } from '../tools/pick';
+import { type CommandName, shapeOf, type ToolName } from '../tools/tools';
+import type { AnnotationActions } from './annotations_panel';
+import type { AppState, PaneName } from './app_state';
+import type { MapPane } from './map_pane';
+import type { MapGestures } from './pointer';
+import type { ToolActions } from './tools_column';
+import type { VideoPane } from './video_pane';
+
+const PICK_PX = 22; // CSS px: a fingertip's half
+
+/** What a click or key does, given the tool in hand. */
+export class Controller implements ToolActions, AnnotationActions {
+  /** What was under the pointer when it went down: the picture may change before it comes up. */
+  private pressed: { landing: Landing | undefined; picked: Annotation | undefined } | undefined;
+
+  constructor(
+    private readonly session: Session,
+    private readonly edits: Edits,
+    private readonly state: AppState,
+    private readonly map: MapPane,
+    private readonly video: VideoPane,
+  ) {}
+
+  choose(tool: ToolName): void {
+    this.state.tool = tool;
+    this.state.hover = undefined;
+    this.state.changed();
+  }
+
+  run(command: CommandName): void {
+    const { state, map } = this;
+    switch (command) {
+      case 'undo':
+        this.attempt('undo', () => this.edits.undo());
+        break;
+      case 'redo':
+        this.attempt('redo', () => this.edits.redo());
+        break;
+      case 'delete':
+        if (state.selectedId) this.remove(state.selectedId);
+        else state.refuse('delete', 'Select a mark first.');
+        break;
+      case 'swap':
+        state.main = state.main === 'map' ? 'video' : 'map';
+        break;
+      case 'follow':
+        if (map.map) map.map.following = !map.map.following;
+        break;
+      case 'frame':
+        map.map?.frameAll();
+        break;
+      case 'reset':
+        state.confirmingReset = !state.confirmingReset;
+        break;
+    }
+    state.changed();
+  }
+
+  confirmReset(really: boolean): void {
+    this.state.confirmingReset = false;
+    this.state.changed();
+    if (really) this.attempt('reset', () => this.edits.resetMap());
+  }
+
+  /** Escape: leave whatever is under way, one thing at a time. */
+  escape(): void {
+    const { state } = this;
+    if (state.confirmingReset) state.confirmingReset = false;
+    else if (state.tool !== 'select') this.choose('select');
+    else state.selectedId = undefined;
+    state.changed();
+  }
+
+  select(id: string): void {
+    this.state.selectedId = this.state.selectedId === id ? undefined : id;
+    this.state.changed();
+  }
+
+  remove(id: string): void {
+    if (this.state.selectedId === id) this.state.selectedId = undefined;
+    this.attempt(`annotation ${id}`, () => this.edits.remove(id));
+  }
+
+  startEditing(id: string): void {
+    if (this.session.annotations.get(id)?.shape !== 'note') return;
+    this.state.editingId = id;
+    this.state.changed();
+  }
+
+  finishEditing(id: string, text: string | undefined): void {
+    if (this.state.editingId !== id) return;
+    this.state.editingId = undefined;
+    this.state.changed();
+    const before = this.session.annotations.get(id)?.text;
+    if (!text || text === before) return;
+    this.attempt(`annotation ${id}`, () => this.edits.setText(id, text));
+  }
+
+  mapGestures(): MapGestures {
+    return {
+      hover: (x, y) => this.hover('map', this.map.pixelAt(x, y)),
+      leave: () => this.leave('map'),
+      moved: () => {
+        this.state.hover = undefined;
+        this.map.map?.hold();
+      },
+      click: (x, y) => {
+        const view = this.map.view();
+        const pixel = this.map.pixelAt(x, y);
+        if (!view) return;
+        this.act('map', this.landing('map', pixel), this.pick(view, pixel, PICK_PX));
+      },
+    };
+  }
+
+  videoGestures(): Omit<MapGestures, 'moved'> & { press(x: number, y: number): void } {
+    return {
+      hover: (x, y) => this.hover('video', this.video.pixelAt(x, y)),
+      leave: () => this.leave('video'),
+      press: (x, y) => {
+        const pixel = this.video.pixelAt(x, y);
+        const view = this.video.current()?.view;
+        this.pressed = pixel && {
+          landing: this.landing('video', pixel),
+          picked: view && this.pick(view, pixel, PICK_PX / this.video.scale),
+        };
+      },
+      click: () => {
+        const { pressed } = this;
+        this.pressed = undefined;
+        if (pressed) this.act('video', pressed.landing, pressed.picked);
+      },
+    };
+  }
+
+  /** Keyboard: acts at the middle of the pane. */
+  clickMiddle(pane: PaneName): void {
+    const { element } = pane === 'map' ? this.map : this.video;
+    const box = element.getBoundingClientRect();
+    const x = box.left + box.width / 2;
+    const y = box.top + box.height / 2;
+    if (pane === 'map') this.mapGestures().click(x, y);
+    else {
+      const gestures = this.videoGestures();
+      gestures.press(x, y);
+      gestures.click(x, y);
+    }
+  }
+
+  private hover(pane: PaneName, pixel: Pixel | undefined): void {
+    const { state } = this;
+    const placing = shapeOf(state.tool) !== undefined;
+    state.hover =
+      placing && pixel ? { pane, pixel, landing: this.landing(pane, pixel) } : undefined;
+    if (placing) state.changed();
+  }
+
+  private leave(pane: PaneName): void {
+    if (this.state.hover?.pane !== pane) return;
+    this.state.hover = undefined;
+    this.state.changed();
+  }
+
+  private landing(pane: PaneName, pixel: Pixel): Landing | undefined {
+    const features = this.session.map.features.values();
+    if (pane === 'map') {
+      const view = this.map.view();
+      return view && landingInMap(view, pixel, features);
+    }
+    const current = this.video.current();
+    return current?.view && landingInVideo(current.view, current.facts.frameId, pixel, features);
+  }
+
+  private pick(view: View, pixel: Pixel, radius: number): Annotation | undefined {
+    const annotations = this.session.annotations.list();
+    return pickNearest(view, pixel, annotations, ({ anchor }) => anchor.pointInWorld, radius);
+  }
+
+  private act(pane: PaneName, landing: Landing | undefined, picked: Annotation | undefined): void {
+    const { state } = this;
+    const shape = shapeOf(state.tool);
+    if (!shape) {
+      state.selectedId = picked?.id;
+      return state.changed();
+    }
+    if (!this.session.live) return state.refuse(pane, 'Not placed: no connection to the server.');
+    if (!landing) return state.refuse(pane, this.whyNoLanding(pane));
+    this.attempt(pane, async () => {
+      const placed = await this.edits.place({
+        shape,
+        text: '',
+        target: landing.target,
+        guessInWorld: landing.pointInWorld,
+      });
+      state.selectedId = placed.id;
+      if (shape === 'note') state.editingId = placed.id;
+      state.changed();
+    });
+  }
+
+  private whyNoLanding(pane: PaneName): string {
+    if (this.session.pose === undefined || this.session.pose.status === 'initialising') {
+      return 'Not placed: the camera’s place is not known yet.';
+    }
+    return pane === 'map'
+      ? 'Not placed: nothing is mapped there.'
+      : 'Not placed: outside the lens.';
+  }
+
+  /** Runs an edit; a refusal is shown where it was asked for. */
+  private attempt(
+    where: CommandName | PaneName | `annotation ${string}`,
+    edit: () => Promise<unknown>,
+  ): void {
+    edit()
+      .catch((error: unknown) => {
+        const reason = error instanceof EditError ? error.message : String(error);
+        this.state.refuse(
+          where,
+          where === 'map' || where === 'video' ? `Not placed: ${reason}` : reason,
+        );
+      })
+      .finally(() => this.state.changed());
+  }
+}

@@ -1,0 +1,62 @@
+import { pageNowMs } from '../session/clock';
+import type { LatencyMeter } from '../session/latency';
+import type { Session } from '../session/session';
+import { h, setClass, setText } from './dom';
+import type { Player } from './player';
+import { presenceWords, statusWords } from './words';
+
+/** One line: what is watched, how tracking is and what to do about it, rates, who is here. */
+export class Header {
+  readonly element: HTMLElement;
+  private readonly source = h('span', { class: 'source' });
+  private readonly mark = h('span', { class: 'mark', 'aria-hidden': 'true' });
+  private readonly status = h('strong', {});
+  private readonly advice = h('span', { class: 'advice' });
+  private readonly statusBox = h(
+    'span',
+    { class: 'status', role: 'status' },
+    this.mark,
+    this.status,
+    this.advice,
+  );
+  private readonly rate = h('span', { class: 'number', title: 'pictures shown a second' });
+  private readonly latency = h('span', {
+    class: 'number',
+    title: 'from the middle of the exposure to this screen, median of the last 90 pictures',
+  });
+  private readonly presence = h('span', { class: 'presence' });
+
+  constructor(helpButton: HTMLElement) {
+    this.element = h(
+      'header',
+      {},
+      h('h1', {}, 'Saccade'),
+      this.source,
+      this.statusBox,
+      h('span', { class: 'space' }),
+      this.rate,
+      this.latency,
+      this.presence,
+      helpButton,
+    );
+  }
+
+  update(session: Session, player: Player, meter: LatencyMeter): void {
+    const nowMs = pageNowMs();
+    const { link, pose, sourceEnded, participants, joined } = session;
+    const words = statusWords({ link, pose, sourceEnded, nowMs });
+    setText(this.source, joined?.source ?? '');
+    this.source.title = joined?.source ?? '';
+    setText(this.mark, words.mark);
+    setText(this.status, words.text);
+    setText(this.advice, words.advice);
+    this.advice.title = words.advice;
+    setClass(this.statusBox, 'warn', words.warn);
+    const fps = player.rate.rate(nowMs);
+    const total = meter.get('total')?.p50;
+    const live = session.live && fps > 0;
+    setText(this.rate, live ? `${fps.toFixed(0)} fps` : '– fps');
+    setText(this.latency, live && total !== undefined ? `${total.toFixed(0)} ms` : '– ms');
+    setText(this.presence, session.live ? presenceWords(participants) : '');
+  }
+}

@@ -1,0 +1,56 @@
+import { COMMANDS, TOOLS } from '../tools/tools';
+import { FEATURE_CSS } from '../scene/feature_css';
+import type { FeatureState } from '../session/types';
+import { h } from './dom';
+
+const LEGEND: readonly [FeatureState, string, string][] = [
+  ['measured', '●', 'measured in this picture'],
+  ['failed', '✕', 'searched for, not found'],
+  ['not_attempted', '○', 'not searched for'],
+];
+
+/** What the keys do and what the colours mean, as a sheet over the page. */
+export class Help {
+  readonly button = h(
+    'button',
+    { type: 'button', class: 'help', 'aria-label': 'Help', title: 'Help (?)' },
+    '?',
+  );
+  readonly dialog: HTMLDialogElement;
+
+  constructor() {
+    const keys = h('dl', {});
+    for (const { label, shown, hint } of [...TOOLS, ...COMMANDS]) {
+      keys.append(h('dt', {}, h('kbd', {}, shown), label), h('dd', {}, hint));
+    }
+    const legend = h('ul', { class: 'legend' });
+    for (const [state, sign, words] of LEGEND) {
+      const mark = h('span', { class: 'sign' }, sign);
+      mark.style.color = FEATURE_CSS[state];
+      legend.append(h('li', {}, mark, words));
+    }
+    const close = h('button', { type: 'button' }, 'Close');
+    close.addEventListener('click', () => this.dialog.close());
+    this.dialog = h(
+      'dialog',
+      { 'aria-label': 'Help' },
+      h('h2', {}, 'Keys'),
+      keys,
+      h('h2', {}, 'Features'),
+      legend,
+      h('h2', {}, 'Map'),
+      h(
+        'p',
+        {},
+        'Drag to orbit, right-drag or Shift-drag to pan, wheel to zoom; on a touch screen one finger, two fingers, pinch. With the map focused: arrow keys orbit, plus and minus zoom, Enter places at the middle.',
+      ),
+      close,
+    );
+    this.button.addEventListener('click', () => this.toggle());
+  }
+
+  toggle(): void {
+    if (this.dialog.open) this.dialog.close();
+    else this.dialog.showModal();
+  }
+}

@@ -1,0 +1,74 @@
+import { controlOf, TOOLS, type ToolName, type CommandName } from '../tools/tools';
+import type { Controller } from './controller';
+import type { Help } from './help';
+import type { MapPane } from './map_pane';
+import type { VideoPane } from './video_pane';
+
+const TURN_RAD = 0.12;
+
+const isTool = (name: ToolName | CommandName): name is ToolName =>
+  TOOLS.some((tool) => tool.name === name);
+
+/** Everything the pointer does, by key. */
+export function handleKeys(
+  controller: Controller,
+  map: MapPane,
+  video: VideoPane,
+  help: Help,
+): void {
+  document.addEventListener('keydown', (event) => {
+    if (event.target instanceof HTMLInputElement || help.dialog.open) return;
+    if (event.key === '?') return help.toggle();
+    if (event.key === 'Escape') return controller.escape();
+    const name = controlOf(event);
+    if (!name) return;
+    event.preventDefault();
+    if (isTool(name)) controller.choose(name);
+    else controller.run(name);
+  });
+  map.element.addEventListener('keydown', (event) => {
+    if (event.target !== map.element || !moveMap(event, map, controller)) return;
+    event.preventDefault();
+  });
+  video.element.addEventListener('keydown', (event) => {
+    if (event.target === video.element && event.key === 'Enter') controller.clickMiddle('video');
+  });
+}
+
+function moveMap(event: KeyboardEvent, pane: MapPane, controller: Controller): boolean {
+  const { map } = pane;
+  if (!map) return false;
+  const pan = event.shiftKey;
+  switch (event.key) {
+    case 'ArrowLeft':
+      if (pan) map.orbit.pan(-0.05, 0);
+      else map.orbit.rotate(-TURN_RAD, 0);
+      break;
+    case 'ArrowRight':
+      if (pan) map.orbit.pan(0.05, 0);
+      else map.orbit.rotate(TURN_RAD, 0);
+      break;
+    case 'ArrowUp':
+      if (pan) map.orbit.pan(0, -0.05);
+      else map.orbit.rotate(0, TURN_RAD);
+      break;
+    case 'ArrowDown':
+      if (pan) map.orbit.pan(0, 0.05);
+      else map.orbit.rotate(0, -TURN_RAD);
+      break;
+    case '+':
+    case '=':
+      map.orbit.zoom(0.85);
+      break;
+    case '-':
+      map.orbit.zoom(1 / 0.85);
+      break;
+    case 'Enter':
+      controller.clickMiddle('map');
+      return true;
+    default:
+      return false;
+  }
+  map.hold();
+  return true;
+}

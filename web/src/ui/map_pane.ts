@@ -1,0 +1,105 @@
+import type { Pixel } from '../geometry/vec3';
+import { projectPoint, type View } from '../geometry/view';
+import type { MapView } from '../scene/map_view';
+import { axisStrokes, strokesOf } from '../scene/strokes';
+import type { Session } from '../session/session';
+import { landingWords, ringRadius } from '../tools/landing';
+import type { AppState } from './app_state';
+import { h, setText } from './dom';
+import { allMarks } from './marks';
+import { Painter } from './painter';
+import type { Player } from './player';
+
+/** The 3D map: three.js below, the same marks as on the video above it. */
+export class MapPane {
+  readonly element: HTMLElement;
+  map: MapView | undefined; // arrives after the video: three.js is the larger part of the page
+  private readonly canvas = h('canvas', { class: 'map' });
+  private readonly painter = new Painter();
+  private readonly note = h('p', { class: 'pane-note', role: 'status' });
+  private drawnState = -1;
+  private drawnAnnotations = -1;
+
+  constructor(
+    private readonly session: Session,
+    private readonly player: Player,
+    private readonly state: AppState,
+  ) {
+    this.element = h(
+      'section',
+      { class: 'pane map3d', 'aria-label': '3D map', tabindex: '0' },
+      this.canvas,
+      this.painter.canvas,
+      h('h2', { class: 'pane-title' }, 'Map'),
+      this.note,
+    );
+  }
+
+  async load(): Promise<void> {
+    try {
+      const { MapView: Loaded } = await import('../scene/map_view');
+      this.map = new Loaded(this.canvas, this.player.canvas, this.session);
+    } catch (error) {
+      const reason = error instanceof Error ? error.message : String(error);
+      this.state.refuse('map', `No 3D map: ${reason}`);
+    }
+  }
+
+  view(): View | undefined {
+    return this.map?.view();
+  }
+
+  pixelAt(clientX: number, clientY: number): Pixel {
+    const box = this.element.getBoundingClientRect();
+    return { u: clientX - box.left - 0.5, v: clientY - box.top - 0.5 };
+  }
+
+  draw(nowMs: number): void {
+    const { map, element } = this;
+    this.updateNote();
+    if (!map) return;
+    const width = element.clientWidth;
+    const height = element.clientHeight;
+    map.resize(width, height);
+    const shown = this.player.shown?.facts;
+    const pose = shown?.pose;
+    const placed = shown && pose && pose.status !== 'initialising' && pose.status !== 'unknown';
+    const moved = map.draw(
+      nowMs,
+      placed
+        ? { frameId: shown.frameId, camera: shown.camera, worldFromCamera: pose.worldFromCamera }
+        : undefined,
+    );
+    const { version } = this.session.annotations;
+    if (!moved && version === this.drawnAnnotations && this.state.version === this.drawnState)
+      return;
+    this.drawnAnnotations = version;
+    this.drawnState = this.state.version;
+    this.drawMarks(map.view(), width, height);
+  }
+
+  private drawMarks(view: View, width: number, height: number): void {
+    this.painter.begin({ width, height }, { left: 0, top: 0, scale: 1 });
+    this.painter.axes(axisStrokes(view));
+    this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), this.state.selectedId);
+    const { hover } = this.state;
+    if (hover?.pane === 'map' && hover.landing) {
+      const at = projectPoint(view, hover.landing.pointInWorld);
+      if (at) this.painter.ring(at, ringRadius(view, hover.landing), landingWords(hover.landing));
+    }
+    const { translation: t, rotation: q } = view.worldFromCamera;
+    this.canvas.dataset['eye'] = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].join(' ');
+    this.canvas.dataset['focalPx'] = String(view.camera.intrinsics.fx);
+  }
+
+  private updateNote(): void {
+    const refusal = this.state.refusal('map');
+    const { map, pose } = this.session;
+    let text = '';
+    if (refusal) text = refusal;
+    else if (!this.map) text = 'loading the map';
+    else if (map.features.size === 0) text = 'nothing mapped yet';
+    else if (pose && !pose.metric) text = 'scale unknown: no target was seen, sizes are relative';
+    setText(this.note, text);
+  }
+}

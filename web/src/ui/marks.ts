@@ -1,0 +1,23 @@
+import { type Mark, markOf } from '../scene/strokes';
+import type { AnnotationBook } from '../session/annotation_book';
+
+/** Everything to draw: the server's annotations, and ours that it has not answered yet. */
+export function allMarks(book: AnnotationBook): Mark[] {
+  const marks = book
+    .list()
+    .filter(({ anchor }) => anchor.state !== 'stopped')
+    .map(markOf);
+  for (const pending of book.pendingList()) {
+    if (!pending.pointInWorld) continue;
+    marks.push({
+      id: '',
+      shape: pending.shape,
+      text: pending.text || 'placing',
+      sizeM: pending.sizeM,
+      pointInWorld: pending.pointInWorld,
+      inkOffsetsM: [],
+      hollow: true,
+    });
+  }
+  return marks;
+}

@@ -1,0 +1,185 @@
+import type { Pixel } from '../geometry/vec3';
+import { FEATURE_CSS } from '../scene/feature_css';
+import type { AxisStroke, Marks } from '../scene/strokes';
+import type { FeatureState } from '../session/types';
+
+const LINE = '#ffffff';
+const ACCENT = '#c4b0ff';
+const HALO = 'rgba(0, 0, 0, 0.65)';
+const AXIS = '#c9ccd0';
+const FONT = '600 13px system-ui, sans-serif';
+
+/** Draws pixels of a view onto a canvas laid over it. */
+export class Painter {
+  readonly canvas = document.createElement('canvas');
+  private readonly context: CanvasRenderingContext2D;
+  private scale = 1; // canvas px per picture px
+  private left = 0;
+  private top = 0;
+  private ratio = 1;
+
+  constructor() {
+    this.canvas.className = 'marks';
+    const context = this.canvas.getContext('2d');
+    if (!context) throw new Error('this browser has no 2D canvas');
+    this.context = context;
+  }
+
+  /** Clears, and maps picture pixels so that the picture fills `rect` (CSS px in the pane). */
+  begin(
+    pane: { width: number; height: number },
+    rect: { left: number; top: number; scale: number },
+  ): void {
+    this.ratio = Math.min(window.devicePixelRatio, 2);
+    const width = Math.round(pane.width * this.ratio);
+    const height = Math.round(pane.height * this.ratio);
+    if (this.canvas.width !== width) this.canvas.width = width;
+    if (this.canvas.height !== height) this.canvas.height = height;
+    this.context.clearRect(0, 0, width, height);
+    this.scale = rect.scale * this.ratio;
+    this.left = rect.left * this.ratio;
+    this.top = rect.top * this.ratio;
+    this.context.lineCap = 'round';
+    this.context.lineJoin = 'round';
+  }
+
+  /** Restricts drawing to the picture; `end` lifts it. */
+  clip(width: number, height: number): void {
+    this.context.save();
+    this.context.beginPath();
+    this.context.rect(this.left, this.top, width * this.scale, height * this.scale);
+    this.context.clip();
+  }
+
+  end(): void {
+    this.context.restore();
+  }
+
+  private x(p: Pixel): number {
+    return this.left + (p.u + 0.5) * this.scale;
+  }
+
+  private y(p: Pixel): number {
+    return this.top + (p.v + 0.5) * this.scale;
+  }
+
+  private trace(points: readonly Pixel[]): void {
+    this.context.beginPath();
+    points.forEach((p, i) => {
+      if (i === 0) this.context.moveTo(this.x(p), this.y(p));
+      else this.context.lineTo(this.x(p), this.y(p));
+    });
+  }
+
+  private stroke(style: string, width: number): void {
+    this.context.strokeStyle = style;
+    this.context.lineWidth = width * this.ratio;
+    this.context.stroke();
+  }
+
+  /** Light lines with a dark halo; the selected mark in the accent colour, a hollow one dashed. */
+  marks({ strokes, labels }: Marks, selectedId: string | undefined): void {
+    const chosen = (id: string): boolean => id !== '' && id === selectedId;
+    for (const { points } of strokes) {
+      this.trace(points);
+      this.stroke(HALO, 5);
+    }
+    for (const { points, hollow, annotationId } of strokes) {
+      if (hollow) this.context.setLineDash([5 * this.ratio, 5 * this.ratio]);
+      this.trace(points);
+      this.stroke(chosen(annotationId) ? ACCENT : LINE, 2);
+      this.context.setLineDash([]);
+    }
+    for (const { text, at, hollow, annotationId } of labels) {
+      this.label(text, at, chosen(annotationId), hollow);
+    }
+  }
+
+  /** A filled box with text, its lower left corner beside a point. */
+  private label(text: string, at: Pixel, chosen: boolean, hollow: boolean): void {
+    const { context, ratio } = this;
+    context.font = FONT.replace('13', String(13 * ratio));
+    const width = context.measureText(text).width + 12 * ratio;
+    const height = 21 * ratio;
+    const x = this.x(at) + 6 * ratio;
+    const y = this.y(at) - height - 4 * ratio;
+    context.fillStyle = 'rgba(16, 17, 18, 0.86)';
+    context.strokeStyle = chosen ? ACCENT : LINE;
+    context.lineWidth = 1.5 * ratio;
+    if (hollow) context.setLineDash([4 * ratio, 4 * ratio]);
+    context.beginPath();
+    context.roundRect(x, y, width, height, 4 * ratio);
+    context.fill();
+    context.stroke();
+    context.setLineDash([]);
+    context.fillStyle = chosen ? ACCENT : LINE;
+    context.textBaseline = 'middle';
+    context.fillText(text, x + 6 * ratio, y + height / 2 + ratio / 2);
+  }
+
+  /** Colour and shape by state: disc measured, cross failed, ring not attempted. */
+  feature(at: Pixel, state: FeatureState): void {
+    const { context, ratio } = this;
+    const x = this.x(at);
+    const y = this.y(at);
+    const r = 3.5 * ratio;
+    context.beginPath();
+    if (state === 'failed') {
+      context.moveTo(x - r, y - r);
+      context.lineTo(x + r, y + r);
+      context.moveTo(x + r, y - r);
+      context.lineTo(x - r, y + r);
+    } else {
+      context.arc(x, y, r, 0, 2 * Math.PI);
+    }
+    this.stroke(HALO, 4);
+    context.fillStyle = FEATURE_CSS[state];
+    if (state === 'measured') context.fill();
+    else this.stroke(FEATURE_CSS[state], 1.8);
+  }
+
+  axes(axes: readonly AxisStroke[]): void {
+    const { context, ratio } = this;
+    for (const { pieces } of axes) {
+      for (const piece of pieces) {
+        this.trace(piece);
+        this.stroke(HALO, 4);
+        this.stroke(AXIS, 1.5);
+      }
+    }
+    context.font = FONT.replace('13', String(12 * ratio));
+    context.textBaseline = 'middle';
+    for (const { name, end } of axes) {
+      if (!end) continue;
+      context.lineWidth = 3 * ratio;
+      context.strokeStyle = HALO;
+      context.strokeText(name, this.x(end) + 5 * ratio, this.y(end));
+      context.fillStyle = AXIS;
+      context.fillText(name, this.x(end) + 5 * ratio, this.y(end));
+    }
+  }
+
+  /** Where a click lands: a ring as large as its uncertainty [picture px], and how large in words. */
+  ring(at: Pixel, radius: number | undefined, words: string): void {
+    const { context, ratio } = this;
+    const r = Math.min(Math.max((radius ?? 0) * this.scale, 5 * ratio), 400 * ratio);
+    context.beginPath();
+    context.arc(this.x(at), this.y(at), r, 0, 2 * Math.PI);
+    if (radius === undefined) context.setLineDash([3 * ratio, 4 * ratio]);
+    this.stroke(HALO, 4);
+    this.stroke(ACCENT, 1.6);
+    context.setLineDash([]);
+    context.beginPath();
+    context.arc(this.x(at), this.y(at), 1.6 * ratio, 0, 2 * Math.PI);
+    context.fillStyle = ACCENT;
+    context.fill();
+    context.font = FONT.replace('13', String(12 * ratio)).replace('600', '500');
+    context.textBaseline = 'middle';
+    context.lineWidth = 3 * ratio;
+    context.strokeStyle = HALO;
+    const x = this.x(at) + r + 7 * ratio;
+    context.strokeText(words, x, this.y(at));
+    context.fillStyle = LINE;
+    context.fillText(words, x, this.y(at));
+  }
+}

@@ -1,0 +1,84 @@
+import { type CommandName, COMMANDS, type Control, type ToolName, TOOLS } from '../tools/tools';
+import type { AppState } from './app_state';
+import { h, icon, setClass, setText } from './dom';
+import { ICONS } from './icons';
+
+export interface ToolActions {
+  choose(tool: ToolName): void;
+  run(command: CommandName): void;
+  confirmReset(really: boolean): void;
+}
+
+/** Tools at the left, one key each; why something cannot be done stands beside its button. */
+export class ToolsColumn {
+  readonly element = h('nav', { 'aria-label': 'Tools' });
+  private readonly buttons = new Map<string, HTMLButtonElement>();
+  private readonly reasons = new Map<CommandName, HTMLElement>();
+  private readonly confirm: HTMLElement;
+
+  constructor(private readonly actions: ToolActions) {
+    for (const tool of TOOLS) this.add(tool, () => actions.choose(tool.name));
+    this.element.append(h('hr'));
+    for (const command of COMMANDS) {
+      if (command.name === 'reset') this.element.append(h('span', { class: 'space' }));
+      const item = this.add(command, () => actions.run(command.name));
+      const reason = h('span', { class: 'reason', role: 'alert' });
+      this.reasons.set(command.name, reason);
+      item.append(reason);
+    }
+    this.confirm = this.makeConfirm();
+    this.buttons.get('reset')?.parentElement?.append(this.confirm);
+  }
+
+  private add(control: Control<string>, act: () => void): HTMLElement {
+    const button = h(
+      'button',
+      { type: 'button', 'data-control': control.name, 'aria-label': control.label },
+      icon(ICONS[control.name as ToolName | CommandName]),
+      h('kbd', {}, control.shown),
+    );
+    button.addEventListener('click', act);
+    this.buttons.set(control.name, button);
+    const tip = h(
+      'span',
+      { class: 'tip', role: 'tooltip' },
+      h('b', {}, control.label),
+      control.hint,
+    );
+    const item = h('div', { class: 'tool' }, button, tip);
+    this.element.append(item);
+    return item;
+  }
+
+  private makeConfirm(): HTMLElement {
+    const yes = h('button', { type: 'button', class: 'danger' }, 'Reset');
+    const no = h('button', { type: 'button' }, 'Keep');
+    yes.addEventListener('click', () => this.actions.confirmReset(true));
+    no.addEventListener('click', () => this.actions.confirmReset(false));
+    return h(
+      'div',
+      { class: 'confirm hidden', role: 'group', 'aria-label': 'Reset the map?' },
+      h('p', {}, 'Forget the map? Marks stay, paused, until their place is known again.'),
+      yes,
+      no,
+    );
+  }
+
+  update(state: AppState, following: boolean): void {
+    for (const { name } of TOOLS) {
+      const button = this.buttons.get(name);
+      if (!button) continue;
+      setClass(button, 'current', state.tool === name);
+      button.setAttribute('aria-pressed', String(state.tool === name));
+    }
+    const follow = this.buttons.get('follow');
+    if (follow) {
+      setClass(follow, 'on', following);
+      follow.setAttribute('aria-pressed', String(following));
+    }
+    for (const [name, element] of this.reasons) setText(element, state.refusal(name) ?? '');
+    const opening = state.confirmingReset && this.confirm.classList.contains('hidden');
+    setClass(this.confirm, 'hidden', !state.confirmingReset);
+    if (opening) this.confirm.querySelector<HTMLButtonElement>('button:last-child')?.focus();
+  }
+}

@@ -1,0 +1,90 @@
+import { pageNowMs } from '../session/clock';
+import type { Session } from '../session/session';
+import { h, setClass, setText } from './dom';
+import type { Player } from './player';
+import { presenceWords, statusWords } from './words';
+
+const STALE_MS = 1000;
+
+/** The wearer's view: the augmented picture, one line of words, a large pause. */
+export class WearerApp {
+  readonly element: HTMLElement;
+  private readonly mark = h('span', { class: 'mark', 'aria-hidden': 'true' });
+  private readonly words = h('span', {});
+  private readonly line = h('p', { class: 'line', role: 'status' }, this.mark, this.words);
+  private readonly watchers = h('p', { class: 'watchers' });
+  private readonly pauseButton = h('button', { type: 'button', class: 'pause' });
+  private readonly fullButton = h('button', { type: 'button', class: 'full' }, 'Full screen');
+  private readonly notice = h('p', { class: 'notice', role: 'alert' });
+  private paused = false;
+
+  constructor(
+    private readonly session: Session,
+    private readonly player: Player,
+  ) {
+    this.element = h(
+      'div',
+      { class: 'wearer-view' },
+      player.canvas,
+      this.line,
+      this.watchers,
+      this.notice,
+      this.pauseButton,
+      this.fullButton,
+    );
+    this.pauseButton.addEventListener('click', () => this.togglePause());
+    this.fullButton.addEventListener('click', () => this.toggleFull());
+    document.addEventListener('keydown', (event) => {
+      if (event.key === ' ' && event.target === document.body) this.togglePause();
+      if (event.key.toLowerCase() === 'f') this.toggleFull();
+    });
+  }
+
+  start(): void {
+    requestAnimationFrame(() => this.frame());
+  }
+
+  private togglePause(): void {
+    this.paused = !this.paused;
+    this.update();
+  }
+
+  private toggleFull(): void {
+    if (document.fullscreenElement) void document.exitFullscreen();
+    else document.documentElement.requestFullscreen().catch(() => undefined);
+  }
+
+  private frame(): void {
+    requestAnimationFrame(() => this.frame());
+    if (!this.paused) this.player.draw();
+    this.update();
+  }
+
+  private update(): void {
+    const { session, player, paused } = this;
+    const { link, pose, sourceEnded } = session;
+    const words = statusWords({ link, pose, sourceEnded, nowMs: pageNowMs() });
+    const text = [words.text, words.advice].filter(Boolean).join(': ');
+    setText(this.mark, paused ? 'Ⅱ' : words.mark);
+    // Nothing reaches the camera from here yet: say what a pause is, and what it is not.
+    setText(this.words, paused ? 'picture held here; experts still see the camera' : text);
+    setClass(this.line, 'warn', words.warn || paused);
+    setText(this.watchers, session.live ? watcherWords(session) : '');
+    setText(this.pauseButton, paused ? '▶ Go on' : 'Ⅱ Pause picture');
+    setText(this.fullButton, document.fullscreenElement ? 'Leave full screen' : 'Full screen');
+    const age = player.shown ? pageNowMs() - player.shown.drawnMs : 0;
+    const stale = age > STALE_MS && !paused && !sourceEnded;
+    setText(this.notice, noticeWords(player, stale ? age : 0));
+    setClass(this.element, 'stale', stale);
+  }
+}
+
+function watcherWords({ participants }: Session): string {
+  const others = presenceWords(participants.filter(({ role }) => role !== 'wearer'));
+  return others ? `${others} watching` : 'nobody watches';
+}
+
+function noticeWords(player: Player, staleMs: number): string {
+  if (player.unsupported) return `No video. ${player.unsupported}`;
+  return staleMs > 0 ? `This picture is ${(staleMs / 1000).toFixed(0)} s old` : '';
+}
