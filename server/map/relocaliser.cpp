@@ -227,14 +227,14 @@ std::vector<Relocaliser::Match> Relocaliser::MatchGuided(const Rigid3& world_fro
   return matches;
 }
 
-std::optional<Relocalisation> Relocaliser::TryKeyframe(const Keyframe& keyframe,
-                                                       const CameraModel& camera,
-                                                       const std::vector<DescribedPoint>& corners,
-                                                       const PointLookup& lookup) const {
-  const auto solve = [&](const std::vector<Match>& matches, int min_inliers) {
+std::optional<Relocalisation> Relocaliser::Confirm(const std::vector<Match>& matches,
+                                                   FrameId keyframe, const CameraModel& camera,
+                                                   const std::vector<DescribedPoint>& corners,
+                                                   const PointLookup& lookup) const {
+  const auto solve = [&](const std::vector<Match>& used, int min_inliers) {
     std::vector<Eigen::Vector3d> points;
     std::vector<Eigen::Vector2d> pixels;
-    for (const Match& match : matches) {
+    for (const Match& match : used) {
       points.push_back(match.point_in_world);
       pixels.push_back(corners[match.corner].pixel);
     }
@@ -244,7 +244,6 @@ std::optional<Relocalisation> Relocaliser::TryKeyframe(const Keyframe& keyframe,
   };
   // By descriptor alone: this, and not what a pose then finds around its own predictions, is the
   // evidence that the place is the right one.
-  const std::vector<Match> matches = MatchKeyframe(keyframe, corners, lookup);
   const int unguided = std::max(6, 2 * options_.min_inliers / 3);
   const auto first = solve(matches, unguided);
   if (!first.ok() || static_cast<double>(first->inliers.size()) <
@@ -254,12 +253,12 @@ std::optional<Relocalisation> Relocaliser::TryKeyframe(const Keyframe& keyframe,
   const std::vector<Match> guided =
       MatchGuided(first->fit.world_from_camera, camera, corners, lookup);
   const auto second = solve(guided, options_.min_inliers);
-  if (!second.ok() || 2 * second->inliers.size() < guided.size()) return std::nullopt;
+  if (!second.ok() || 3 * second->inliers.size() < guided.size()) return std::nullopt;
 
   Relocalisation found;
   found.world_from_camera = second->fit.world_from_camera;
   found.pose_covariance = second->fit.covariance;
-  found.keyframe = keyframe.frame;
+  found.keyframe = keyframe;
   double squared = 0;
   for (const int k : second->inliers) {
     const Match& match = guided[k];
@@ -283,11 +282,20 @@ std::optional<Relocalisation> Relocaliser::Query(const cv::Mat& grey, const Came
   const std::vector<Eigen::Vector2d> pixels = QueryCorners(grey, options_.max_corners);
   if (static_cast<int>(pixels.size()) < options_.min_inliers) return std::nullopt;
   const std::vector<DescribedPoint> corners = DescribePixels(grey, pixels);
-  for (const int k : Shortlist(Thumbnail(grey), corners)) {
-    auto found = TryKeyframe(keyframes_[k], camera, corners, lookup);
+  const std::vector<int> candidates = Shortlist(Thumbnail(grey), corners);
+  std::vector<Match> pooled;
+  std::set<int> taken;
+  for (const int k : candidates) {
+    const std::vector<Match> matches = MatchKeyframe(keyframes_[k], corners, lookup);
+    auto found = Confirm(matches, keyframes_[k].frame, camera, corners, lookup);
     if (found) return found;
+    for (const Match& match : matches) {
+      if (taken.insert(match.corner).second) pooled.push_back(match);
+    }
   }
-  return std::nullopt;
+  // A view between keyframes may have a few features of each.
+  if (candidates.size() < 2) return std::nullopt;
+  return Confirm(pooled, keyframes_[candidates.front()].frame, camera, corners, lookup);
 }
 
 }  // namespace saccade

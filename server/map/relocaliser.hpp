@@ -105,9 +105,11 @@ class Relocaliser {
   std::vector<Match> MatchKeyframe(const Keyframe& keyframe,
                                    const std::vector<DescribedPoint>& corners,
                                    const PointLookup& lookup) const;
-  std::optional<Relocalisation> TryKeyframe(const Keyframe& keyframe, const CameraModel& camera,
-                                            const std::vector<DescribedPoint>& corners,
-                                            const PointLookup& lookup) const;
+  /// The pose that `matches` agree on, checked against the whole map; nothing if in doubt.
+  std::optional<Relocalisation> Confirm(const std::vector<Match>& matches, FrameId keyframe,
+                                        const CameraModel& camera,
+                                        const std::vector<DescribedPoint>& corners,
+                                        const PointLookup& lookup) const;
   /// Features of all keyframes that `pose` predicts near a corner of their look.
   std::vector<Match> MatchGuided(const Rigid3& world_from_camera, const CameraModel& camera,
                                  const std::vector<DescribedPoint>& corners,
