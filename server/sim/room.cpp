@@ -1,66 +1,101 @@
 #include "server/sim/room.hpp"
 
-#include <opencv2/imgproc.hpp>
+#include <algorithm>
+#include <thread>
 
 #include "server/sim/light_bake.hpp"
 #include "server/sim/room_builder.hpp"
+#include "server/sim/room_parts.hpp"
 #include "server/sim/wearer.hpp"
 
 namespace saccade {
+namespace {
+
+constexpr float kPi = 3.14159265f;
+
+/// An area light given in room coordinates.
+AreaLight RoomLight(const RoomBuilder& room, const Eigen::Vector3f& centre,
+                    const Eigen::Vector3f& half_u, const Eigen::Vector3f& half_v,
+                    const Eigen::Vector3f& facing, const Eigen::Vector3f& rgb, int samples) {
+  const Eigen::Vector3f origin = room.ToWorld(Eigen::Vector3f::Zero());
+  return {.centre = room.ToWorld(centre),
+          .half_u = room.ToWorld(half_u) - origin,
+          .half_v = room.ToWorld(half_v) - origin,
+          .normal = room.ToWorld(facing) - origin,
+          .rgb = rgb,
+          .samples = samples};
+}
+
+std::vector<AreaLight> Lights(const RoomBuilder& room) {
+  const Eigen::Vector3f day(6.0f, 6.9f, 8.0f), lamp(11.5f, 10.9f, 9.6f), desk_lamp(22, 17, 11);
+  return {
+      RoomLight(room, {0.03f, 1.5f, 2.45f}, {0, 0, 0.62f}, {0, 0.57f, 0}, {1, 0, 0}, day, 4),
+      RoomLight(room, {1.5f, 2.46f, 1.8f}, {0.29f, 0, 0}, {0, 0, 0.29f}, {0, -1, 0}, lamp, 3),
+      RoomLight(room, {2.7f, 2.46f, 2.4f}, {0.29f, 0, 0}, {0, 0, 0.29f}, {0, -1, 0}, lamp, 3),
+      RoomLight(room, {2.66f, 1.17f, 0.30f}, {0.04f, 0, 0}, {0, 0, 0.04f}, {0, -1, 0}, desk_lamp,
+                2),
+  };
+}
+
+}  // namespace
+
+RoomMaterials::RoomMaterials(std::uint64_t seed_in, RoomBuilder& room) : seed(seed_in) {
+  palette = room.AddTexture(PaintPalette(seed));
+  spines = room.AddTexture(PaintSpines(seed));
+  cartons = room.AddTexture(PaintCartons(seed));
+  papers = room.AddTexture(PaintPapers(seed));
+  light_wood = {.texture = room.AddTexture(PaintFurnitureWood(seed, Rgb(206, 178, 138))),
+                .tile_m = {0.9f, 0.6f}};
+  dark_wood = {.texture = room.AddTexture(PaintFurnitureWood(seed + 1, Rgb(122, 84, 54))),
+               .tile_m = {0.9f, 0.6f}};
+}
+
+Paint RoomMaterials::Cell(int texture, int column, int row, int columns, int rows) {
+  const Eigen::Vector2f size(1.0f / static_cast<float>(columns), 1.0f / static_cast<float>(rows));
+  const Eigen::Vector2f at(static_cast<float>(column), static_cast<float>(row));
+  return {.texture = texture, .origin = at.cwiseProduct(size), .size = size};
+}
+
+Paint RoomMaterials::Plain(PaletteCell cell) const {
+  Paint paint = Cell(palette, cell % 8, cell / 8, 8, 8);
+  paint.origin += 0.2f * paint.size;  // clear of the neighbours
+  paint.size *= 0.6f;
+  return paint;
+}
+
+void PushWall(RoomBuilder& room, Wall wall) {
+  switch (wall) {
+    case Wall::kDesk:
+      return room.Push({0, 0, 0});
+    case Wall::kRight:
+      return room.Push({4, 0, 0}, -0.5f * kPi);
+    case Wall::kBack:
+      return room.Push({4, 0, 4}, kPi);
+    case Wall::kLeft:
+      return room.Push({0, 0, 4}, 0.5f * kPi);
+  }
+}
 
 ChessboardTarget SimChessboard() {
   return {.columns = 9, .rows = 6, .square_m = 0.04, .hint_px = {}};
 }
 
-namespace {
-cv::Mat Noise(cv::RNG& rng, int w, int h, cv::Scalar base, double sigma) {
-  cv::Mat image(h, w, CV_8UC3, base);
-  cv::Mat noise(h, w, CV_16SC3), sum;
-  rng.fill(noise, cv::RNG::NORMAL, 0, sigma);
-  cv::add(image, noise, sum, cv::noArray(), CV_8U);
-  return sum;
-}
-cv::Mat Board() {
-  cv::Mat image(720, 960, CV_8UC3, cv::Scalar(240, 242, 243));
-  for (int j = 0; j < 7; ++j)
-    for (int i = 0; i < 10; ++i)
-      if ((i + j) % 2 == 0)
-        image(cv::Rect(80 + 80 * i, 80 + 80 * j, 80, 80)) = cv::Scalar(25, 25, 25);
-  return image;
-}
-}  // namespace
-
 RoomScene BuildRoom(std::uint64_t seed) {
-  cv::RNG rng(seed);
   const Rigid3 pose = WorldFromRoom();
-  Eigen::Isometry3d iso = Eigen::Isometry3d::Identity();
-  iso.translate(pose.translation);
-  iso.rotate(pose.rotation);
-  RoomBuilder room(iso);
-  const Paint wall{.texture = room.AddTexture(Noise(rng, 512, 512, {205, 215, 220}, 14))};
-  const Paint floor{.texture = room.AddTexture(Noise(rng, 512, 512, {90, 120, 150}, 25))};
-  const Paint wood{.texture = room.AddTexture(Noise(rng, 512, 512, {80, 130, 180}, 30))};
-  const Paint board{.texture = room.AddTexture(Board(), false)};
-  room.SetLightSpacing(0.1f);
-  room.Quad(wall, {0, 2.5f, 0}, {4, 0, 0}, {0, -2.5f, 0});
-  room.Quad(wall, {4, 2.5f, 4}, {-4, 0, 0}, {0, -2.5f, 0});
-  room.Quad(wall, {0, 2.5f, 4}, {0, 0, -4}, {0, -2.5f, 0});
-  room.Quad(wall, {4, 2.5f, 0}, {0, 0, 4}, {0, -2.5f, 0});
-  room.Quad(floor, {0, 0, 0}, {4, 0, 0}, {0, 0, 4});
-  room.Quad(wall, {0, 2.5f, 4}, {4, 0, 0}, {0, 0, -4});
-  room.SetLightSpacing(0.04f);
-  room.Box(BoxPaint(wood), {1.1f, 0.71f, 0}, {1.8f, 0.03f, 0.75f}, true);
-  BoxPaint chess(wall);
-  chess.front = board;
-  room.Box(chess, {1.76f, 0.94f, 0}, {0.48f, 0.36f, 0.008f}, true);
-  room.Name("chessboard", {1.84f, 1.22f, 0.008f});
+  Eigen::Isometry3d world_from_room = Eigen::Isometry3d::Identity();
+  world_from_room.translate(pose.translation);
+  world_from_room.rotate(pose.rotation);
+  RoomBuilder room(world_from_room);
+  const RoomMaterials materials(seed, room);
+  // Walls first: the renderer draws what comes last first.
+  BuildShell(room, materials);
+  BuildPictures(room, materials);
+  BuildFurniture(room, materials);
+  BuildDesk(room, materials);
+  const std::vector<AreaLight> lights = Lights(room);
   RoomScene scene = room.Take();
-  BakeLight({{.centre = {0.16f, 1.22f - 2.45f, -2},
-              .half_u = {0.3f, 0, 0},
-              .half_v = {0, 0, 0.3f},
-              .normal = {0, 1, 0},
-              .rgb = {18, 18, 17}}},
-            2, scene);
+  const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1u, 4u);
+  BakeLight(lights, static_cast<int>(threads), scene);
   return scene;
 }
 

@@ -142,6 +142,30 @@ void RoomBuilder::Disc(const Paint& paint, const Eigen::Vector3f& centre, float 
   }
 }
 
+void RoomBuilder::Sheet(const Paint& paint, int columns, int rows,
+                        const std::function<Eigen::Vector3f(float, float)>& shape, float width_m,
+                        float height_m) {
+  std::vector<Eigen::Vector3f> positions, normals;
+  constexpr float kStep = 1e-3f;
+  for (int row = 0; row <= rows; ++row) {
+    for (int column = 0; column <= columns; ++column) {
+      const float s = static_cast<float>(column) / static_cast<float>(columns);
+      const float t = static_cast<float>(row) / static_cast<float>(rows);
+      const float s0 = std::max(s - kStep, 0.0f), s1 = std::min(s + kStep, 1.0f);
+      const float t0 = std::max(t - kStep, 0.0f), t1 = std::min(t + kStep, 1.0f);
+      positions.push_back(shape(s, t));
+      normals.push_back((shape(s, t1) - shape(s, t0)).cross(shape(s1, t) - shape(s0, t)));
+      // A tip, where the sheet has no width, takes its neighbour's normal.
+      if (normals.back().norm() < 1e-12f) {
+        normals.back() =
+            normals.size() > 1 ? normals[normals.size() - 2] : Eigen::Vector3f::UnitY();
+      }
+      normals.back().normalize();
+    }
+  }
+  AddGrid(paint, columns, rows, positions, normals, width_m, height_m);
+}
+
 void RoomBuilder::Name(const std::string& name, const Eigen::Vector3f& point) {
   scene_.objects.push_back({name, (WorldFromLocal() * point).cast<double>()});
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -58,6 +59,15 @@ class RoomBuilder {
   /// A flat, round lid at height of `centre`, facing up (or down).
   void Disc(const Paint& paint, const Eigen::Vector3f& centre, float radius, int sides = 20,
             bool facing_down = false);
+
+  /// A curved sheet: `shape(s, t)`, s to the right and t down as seen from the side that shows,
+  /// both 0 .. 1. `width_m` and `height_m` set how finely its light is sampled.
+  void Sheet(const Paint& paint, int columns, int rows,
+             const std::function<Eigen::Vector3f(float, float)>& shape, float width_m,
+             float height_m);
+
+  /// A point of the current local frame in world [m].
+  Eigen::Vector3f ToWorld(const Eigen::Vector3f& point) const { return WorldFromLocal() * point; }
 
   /// Names a point given in the current local frame.
   void Name(const std::string& name, const Eigen::Vector3f& point);
