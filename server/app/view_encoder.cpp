@@ -65,9 +65,9 @@ absl::Status ViewEncoder::Prepare(const cv::Mat& picture, const TrackedFrame& fr
 void ViewEncoder::Step(const TrackedFrame& frame) {
   const Timestamp begin_ns = MonotonicNow();
   const cv::Mat picture = draw_(frame);
-  absl::Status status = Prepare(picture, frame);
-  absl::StatusOr<EncodedPicture> coded = status;
-  if (status.ok()) coded = encoder_->Encode(picture, TakeKeyFrameRequest(begin_ns));
+  const absl::Status ready = Prepare(picture, frame);
+  const absl::StatusOr<EncodedPicture> coded =
+      ready.ok() ? encoder_->Encode(picture, TakeKeyFrameRequest(begin_ns)) : ready;
   if (!coded.ok()) {
     if (!failed_) std::fprintf(stderr, "video: %s\n", coded.status().ToString().c_str());
     failed_ = true;
