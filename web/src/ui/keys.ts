@@ -18,9 +18,9 @@ export function handleKeys(
 ): void {
   document.addEventListener('keydown', (event) => {
     if (event.target instanceof HTMLInputElement || help.dialog.open) return;
-    if (event.key === '?') return help.toggle();
-    if (event.key === 'Escape') return controller.escape();
     const name = controlOf(event);
+    if (event.key === '?') help.toggle();
+    if (event.key === 'Escape') controller.escape();
     if (!name) return;
     event.preventDefault();
     if (isTool(name)) controller.choose(name);

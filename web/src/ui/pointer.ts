@@ -35,7 +35,10 @@ export function handleMapPointer(pane: MapPane, gestures: MapGestures): void {
   });
   element.addEventListener('pointermove', (event) => {
     const last = down.get(event.pointerId);
-    if (!last) return gestures.hover(event.clientX, event.clientY);
+    if (!last) {
+      gestures.hover(event.clientX, event.clientY);
+      return;
+    }
     const dx = event.clientX - last.x;
     const dy = event.clientY - last.y;
     travelled += Math.hypot(dx, dy);
