@@ -65,11 +65,6 @@ void AddSim(CLI::App& app, SimArguments& arguments) {
 }
 
 int Main(int argc, char** argv) {
-  if (__builtin_cpu_supports("avx2") == 0 || __builtin_cpu_supports("fma") == 0) {
-    std::cerr << "saccade-eval: this build needs an x86-64-v3 processor (AVX2 and FMA); build it "
-                 "with an older -march\n";
-    return 1;
-  }
   cv::setNumThreads(1);  // results must not depend on the machine's cores
   CLI::App app("Saccade's evaluation: runs on recordings, scores, simulation", "saccade-eval");
   app.set_version_flag("--version", "saccade-eval " SACCADE_VERSION);

@@ -69,8 +69,8 @@ Vector3d TargetPoint(int i, int count) {
 /// One step of the agile model M1 (slam-spec section 3), drawn back to the middle of the room and
 /// to where the wearer means to look: weakly beside the model's noise.
 void Move(Draw& draw, const PointsOptions& options, double time_s, double dt, PointsFrame& state) {
-  constexpr double kSpring = 0.3, kDamping = 0.8;          // of position [1/s^2, 1/s]
-  constexpr double kTurnSpring = 2.0, kTurnDamping = 4.0;  // of direction
+  constexpr double kSpring = 0.6, kDamping = 1.2;          // of position [1/s^2, 1/s]
+  constexpr double kTurnSpring = 6.0, kTurnDamping = 5.0;  // of direction
   const double yaw = 0.6 * std::sin(2.0 * std::numbers::pi * time_s / 20.0);
   const Vector3d aim =
       LogQuaternion(state.world_from_camera.rotation.conjugate() * ExpQuaternion({0, yaw, 0}));

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <set>
+#include <vector>
+
+#include "server/eval/points_world.hpp"
+#include "server/filter/filter_state.hpp"
+
+namespace saccade {
+
+/// What the filter is told about the room.
+enum class PointsMode {
+  kKnownMap,  // every point is known: localisation only (T39)
+  kSlamFej,   // the target's points are known, the others are mapped; first-estimates Jacobians
+              // (T40)
+  kSlam,      // the same with Jacobians at the current estimates
+};
+
+/// What one frame did to the filter, against the truth.
+struct PointsStep {
+  double nees = 0;  // of the 6-D pose
+  double nis = 0;   // of all matches together: chi-square with 2 * matches degrees of freedom
+  int matches = 0;
+  double position_error_m = 0;
+  double rotation_error_rad = 0;
+};
+
+/// The real filter on one PointsWorld. The first estimate is drawn from the first covariance, so
+/// that a consistent filter is consistent from the first frame on.
+class PointsFilter {
+ public:
+  PointsFilter(const PointsWorld& world, const PointsOptions& options, PointsMode mode);
+
+  /// Frames in order, from 0. An error is the filter's own: a covariance that broke.
+  absl::StatusOr<PointsStep> Step(std::size_t frame);
+  const FilterState& filter() const { return filter_; }
+
+ private:
+  std::vector<Observation> Match(const PointsFrame& frame) const;
+  absl::Status Birth(const PointsFrame& frame, std::size_t matched);
+  bool IsKnown(int point) const;
+  double MedianInverseRange(const PointsFrame& frame) const;
+
+  const PointsWorld& world_;
+  const PointsOptions options_;
+  const PointsMode mode_;
+  FilterState filter_;
+  std::set<int> mapped_;  // points that were ever born; a removed one does not come back
+  FeatureId next_id_ = 1;
+  std::vector<FeatureId> id_of_point_;  // 0: none
+};
+
+}  // namespace saccade
