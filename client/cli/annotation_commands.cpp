@@ -64,14 +64,6 @@ absl::StatusOr<Annotation> Find(net::Connection& connection, const std::string& 
   return *found;
 }
 
-void PrintDone(const Options& options, absl::string_view verb, absl::string_view what) {
-  if (options.json) {
-    std::cout << nlohmann::json{{verb, what}}.dump() << "\n";
-  } else {
-    std::cout << verb << ": " << what << "\n";
-  }
-}
-
 }  // namespace
 
 absl::Status RunAnnotate(const Options& options, net::Connection& connection) {
@@ -96,7 +88,11 @@ absl::Status RunAnnotations(const Options& options, net::Connection& connection)
     const bool undo = options.command == Command::kUndo;
     const absl::StatusOr<std::string> done = undo ? connection.Undo() : connection.Redo();
     if (!done.ok()) return done.status();
-    PrintDone(options, undo ? "undone" : "redone", *done);
+    if (options.json) {
+      std::cout << nlohmann::json{{undo ? "undone" : "redone", *done}}.dump() << "\n";
+    } else {
+      std::cout << *done << "\n";
+    }
     return absl::OkStatus();
   }
   if (options.command == Command::kListAnnotations) {
@@ -114,7 +110,11 @@ absl::Status RunAnnotations(const Options& options, net::Connection& connection)
   if (absl::Status deleted = connection.DeleteAnnotation(annotation->id); !deleted.ok()) {
     return deleted;
   }
-  PrintDone(options, "deleted", annotation->id);
+  if (options.json) {
+    std::cout << nlohmann::json{{"deleted", annotation->id}}.dump() << "\n";
+  } else {
+    std::cout << "deleted " << annotation->id << "\n";
+  }
   return absl::OkStatus();
 }
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <iostream>
 
 #include "client/cli/text.hpp"
@@ -26,7 +27,8 @@ absl::Status WriteFile(const std::string& path, const std::string& data) {
   const bool closed = std::fclose(file) == 0;
   if (written && closed) return absl::OkStatus();
   const int error = written ? errno : write_error;
-  std::remove(path.c_str());
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
   return absl::UnavailableError(absl::StrCat("cannot finish ", path, ": ", std::strerror(error),
                                              "; free some space or name another file with --out"));
 }

@@ -9,9 +9,10 @@
 namespace saccade {
 namespace {
 
-constexpr Timestamp kReselectNs = 2'000'000'000;  // a better cluster is looked for this often
-constexpr std::uint32_t kMinMatches = 3;          // before a seeded feature says anything
-constexpr std::uint32_t kManyMatches = 20;        // before it may overrule the click's own depth
+constexpr Timestamp kReselectNs = 2'000'000'000;   // a better cluster is looked for this often
+constexpr std::uint32_t kMinMatches = 3;           // before a seeded feature says anything
+constexpr std::uint32_t kManyMatches = 20;         // before it may overrule the click's own depth
+constexpr Timestamp kSeedGraceNs = 1'000'000'000;  // a seeded feature is in the map by then
 constexpr double kConsistentChi2 = 16.0;
 
 struct Candidate {
@@ -197,6 +198,14 @@ PlaceEstimate WithSeed(const MapView& map, const FeatureSnapshot& seed, PlaceEst
   return estimate;
 }
 
+/// The map dropped the seeded feature: what it taught stays, certainty too.
+void ForgetSeed(AnchorPlace& place) {
+  if (place.seed_seen) place.clicked_point = place.point;
+  if (place.seed_covariance) place.clicked_covariance = *place.seed_covariance;
+  place.seed.reset();
+  place.seed_is_target = false;
+}
+
 }  // namespace
 
 MapView::MapView(std::shared_ptr<const MapSnapshot> snapshot) : snapshot_(std::move(snapshot)) {
@@ -221,19 +230,18 @@ PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPla
     member.last_in_world = map.Find(member.id)->point_in_world;
   }
 
+  const Timestamp now_ns = map.snapshot().capture_time_ns;
+  if (place.placed_ns == 0) place.placed_ns = now_ns;
   PlaceEstimate estimate = FromCluster(map, place);
   if (place.seed) {
     if (const FeatureSnapshot* seed = map.Find(*place.seed)) {
+      place.seed_seen = true;
       estimate = WithSeed(map, *seed, estimate, place);
-    } else {  // the map dropped it: what it taught stays
-      place.seed.reset();
-      place.seed_is_target = false;
-      place.clicked_point = place.point;
-      if (place.seed_covariance) place.clicked_covariance = *place.seed_covariance;
+    } else if (place.seed_seen || now_ns - place.placed_ns > kSeedGraceNs) {
+      ForgetSeed(place);
       estimate = FromCluster(map, place);
     }
   }
-  const Timestamp now_ns = map.snapshot().capture_time_ns;
   const double dt =
       place.last_time_ns == 0 ? 0 : std::max(0.0, Seconds(now_ns - place.last_time_ns));
   place.last_time_ns = now_ns;

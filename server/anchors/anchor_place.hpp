@@ -52,11 +52,13 @@ struct AnchorPlace {
   Eigen::Matrix3d clicked_covariance = Eigen::Matrix3d::Zero();
   double distance_m = 1.0;        // from the camera when it was placed: scale of what is near
   std::optional<FeatureId> seed;  // feature at the very pixel; refines the point as it converges
+  bool seed_seen = false;         // a new one is in the map from the next frame on
   bool seed_is_target = false;    // the feature itself was chosen
 
   Rigid3 world_from_binding;
   /// The seeded feature's own covariance while it was the better witness, in binding [m^2].
   std::optional<Eigen::Matrix3d> seed_covariance;
+  Timestamp placed_ns = 0;
   Timestamp last_selected_ns = 0;  // members were last compared with the rest of the map
   bool was_tracking = false;       // has been sure once: now TRACKING or PAUSED, not PROVISIONAL
   bool paused = false;             // by its own error (hysteresis)

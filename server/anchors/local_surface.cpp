@@ -15,7 +15,8 @@ constexpr double kMaxSlope = 5.0;         // |d ln(rho) / d angle|: a surface se
 constexpr double kPriorSlope = 2.0;       // sigma of the same, before any plane is known
 constexpr double kAtFeaturePx = 3.0;
 constexpr double kContradictPx = 6.0;
-constexpr double kFloor = 0.004;  // share of depth: no estimate claims to be better
+constexpr double kSparseRad = 0.015;  // ambiguity is not looked for on a finer scale
+constexpr double kFloor = 0.004;      // share of depth: no estimate claims to be better
 
 /// A plane seen from a pinhole: inverse depth is affine in x/z, y/z.
 struct InverseDepthSample {
@@ -97,6 +98,25 @@ class PlaneFinder {
     const double residual = sample.rho - Predict(plane, sample.angle);
     const double tolerance = Tolerance(sample.rho);
     return residual * residual / (sample.sigma * sample.sigma + tolerance * tolerance);
+  }
+
+  /// Variance of the depth at the ray because the ray may hit what the nearby outliers lie on and
+  /// not the plane [m^2]: a mixture, weighted by nearness on the scale of the third nearest sample.
+  double AmbiguityVariance(const Plane& plane) const {
+    const double scale =
+        std::max(kSparseRad, samples_[std::min<std::size_t>(2, samples_.size() - 1)].radius);
+    double total = 0, spread = 0;
+    for (const InverseDepthSample& sample : samples_) {
+      const double weight = std::exp(-0.5 * std::pow(sample.radius / scale, 4));
+      total += weight;
+      if (Chi2(plane, sample) <= 9.0) continue;
+      const double expected = Predict(plane, sample.angle);
+      const double z = 1.0 / plane.coefficients(0);
+      // The difference at the sample, carried to the ray as a share of depth.
+      const double relative = std::clamp(expected / sample.rho - 1.0, -0.7, 2.0);
+      spread += weight * std::pow(relative * z, 2);
+    }
+    return total > 0 ? spread / total : 0.0;
   }
 
  private:
@@ -237,8 +257,9 @@ std::optional<SurfaceDepth> EstimateDepth(const std::vector<SurfaceSample>& samp
       // Either may be right: say so, and let the seeded feature decide.
       depth.sigma_m =
           std::hypot(depth.sigma_m, 0.3 * std::abs(depth.depth_m - 1.0 / plane->coefficients(0)));
-    } else if (nearest_px < kAtFeaturePx) {
-      depth.at_feature = nearest->index;
+    } else {
+      depth.sigma_m = std::hypot(depth.sigma_m, std::sqrt(finder.AmbiguityVariance(*plane)));
+      if (nearest_px < kAtFeaturePx) depth.at_feature = nearest->index;
     }
     return depth;
   }

@@ -85,6 +85,7 @@ void Engine::Stop() {
   }
   stills_.Stop();
   for (const auto& view : views_) view->Stop();
+  const std::lock_guard lock(book_gone_mutex_);
   book_ = nullptr;  // commits what is queued and answers it
 }
 
@@ -195,6 +196,11 @@ void Engine::RunClock(std::stop_token stop) {
 }
 
 absl::Status Engine::Submit(Command command) { return inbox_.Submit(std::move(command)); }
+
+std::shared_ptr<const AnnotationList> Engine::annotations() const {
+  const std::lock_guard lock(book_gone_mutex_);
+  return book_ ? book_->Latest() : std::make_shared<const AnnotationList>();
+}
 
 void Engine::SetVideoDemand(VideoView view, bool wanted) {
   views_[static_cast<std::size_t>(view)]->SetDemand(wanted);

@@ -51,6 +51,7 @@ class Engine : public Backend {
 
   absl::Status Submit(Command command) override;
   const ServerFacts& facts() const override { return facts_; }
+  std::shared_ptr<const AnnotationList> annotations() const override;
   void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) override;
   void SetVideoDemand(VideoView view, bool wanted) override;
   void RequestKeyFrame(VideoView view) override;
@@ -89,6 +90,7 @@ class Engine : public Backend {
   std::unique_ptr<FrameSource> source_;    // source thread
   std::unique_ptr<FrameTracker> tracker_;  // tracker thread
   std::unique_ptr<AnnotationBook> book_;   // tracker thread, but for Latest()
+  mutable std::mutex book_gone_mutex_;     // held to throw book_ away, and to read it elsewhere
   FrameRing ring_;
   Inbox<Input, Command> inbox_;
   std::array<std::unique_ptr<ViewEncoder>, kVideoViews> views_;

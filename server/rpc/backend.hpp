@@ -30,6 +30,8 @@ struct Still {
 class Backend : public CommandPort {
  public:
   virtual const ServerFacts& facts() const = 0;
+  /// All annotations with every edit that was answered, before the first frame too; never null.
+  virtual std::shared_ptr<const AnnotationList> annotations() const = 0;
   /// Encodes on another thread. `frame_id` absent: newest. Errors go to `done`:
   ///   NotFound           no longer, or not yet, in the ring
   ///   ResourceExhausted  too many stills are being made

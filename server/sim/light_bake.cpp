@@ -58,13 +58,15 @@ SurfacePoint At(const SurfacePatch& patch, float s, float t) {
   return {mix(patch.positions), mix(patch.normals).normalized()};
 }
 
-/// The point of light sample (i, j), kept off the patch's rim, where it would touch its neighbours.
-SurfacePoint SampleAt(const SurfacePatch& patch, int i, int j) {
-  const auto place = [](int k, int n) {
-    return std::clamp(static_cast<float>(k) / static_cast<float>(n - 1),
-                      0.15f / static_cast<float>(n), 1 - 0.15f / static_cast<float>(n));
+/// The point at sample (i, j) of `columns` x `rows`, kept off the patch's rim, where it would touch
+/// its neighbours.
+SurfacePoint SampleAt(const SurfacePatch& patch, int i, int j, int columns, int rows) {
+  const auto place = [](int k, int n, int light_n) {
+    const float rim = 0.15f / static_cast<float>(light_n);
+    return std::clamp(static_cast<float>(k) / static_cast<float>(n - 1), rim, 1 - rim);
   };
-  SurfacePoint point = At(patch, place(i, patch.light_columns), place(j, patch.light_rows));
+  SurfacePoint point =
+      At(patch, place(i, columns, patch.light_columns), place(j, rows, patch.light_rows));
   point.position += kOffset_m * point.normal;
   return point;
 }
@@ -131,33 +133,59 @@ class Baker {
   void BakeDirect(const SurfacePatch& patch) {
     for (int j = 0; j < patch.light_rows; ++j) {
       for (int i = 0; i < patch.light_columns; ++i) {
-        const Eigen::Vector3f light = Direct(SampleAt(patch, i, j), lights_, caster_);
+        const Eigen::Vector3f light =
+            Direct(SampleAt(patch, i, j, patch.light_columns, patch.light_rows), lights_, caster_);
         direct_.at<cv::Vec3f>(patch.light_y + j, patch.light_x + i) = {light.x(), light.y(),
                                                                        light.z()};
       }
     }
   }
 
+  /// Bounced light is smooth: it is gathered at every second sample of a large patch.
   void BakeBounce(const SurfacePatch& patch) {
-    for (int j = 0; j < patch.light_rows; ++j) {
-      for (int i = 0; i < patch.light_columns; ++i) {
-        const SurfacePoint at = SampleAt(patch, i, j);
-        const Eigen::Vector3f side =
-            at.normal
-                .cross(std::abs(at.normal.x()) < 0.7f ? Eigen::Vector3f::UnitX()
-                                                      : Eigen::Vector3f::UnitY())
-                .normalized();
-        Eigen::Matrix3f basis;
-        basis << side, at.normal.cross(side), at.normal;
-        Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-        for (const Eigen::Vector3f& d : spiral_) sum += Gather(at.position, basis * d);
-        const Eigen::Vector3f light = sum / kBounceRays;
-        cv::Vec3f& out = total_.at<cv::Vec3f>(patch.light_y + j, patch.light_x + i);
-        out = direct_.at<cv::Vec3f>(patch.light_y + j, patch.light_x + i) +
-              cv::Vec3f(light.x(), light.y(), light.z());
-        if (patch.glow > 0) out = cv::Vec3f::all(patch.glow);
+    if (patch.glow > 0) {
+      const cv::Rect area(patch.light_x, patch.light_y, patch.light_columns, patch.light_rows);
+      total_(area) = cv::Scalar::all(patch.glow);
+      return;
+    }
+    const auto coarse = [](int n) { return n < 5 ? n : n / 2 + 1; };
+    const int columns = coarse(patch.light_columns), rows = coarse(patch.light_rows);
+    cv::Mat gathered(rows, columns, CV_32FC3);
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        gathered.at<cv::Vec3f>(j, i) = GatherAll(SampleAt(patch, i, j, columns, rows));
       }
     }
+    for (int j = 0; j < patch.light_rows; ++j) {
+      for (int i = 0; i < patch.light_columns; ++i) {
+        const cv::Point at(patch.light_x + i, patch.light_y + j);
+        const float x =
+            static_cast<float>(i * (columns - 1)) / static_cast<float>(patch.light_columns - 1);
+        const float y =
+            static_cast<float>(j * (rows - 1)) / static_cast<float>(patch.light_rows - 1);
+        const int x0 = std::min(static_cast<int>(x), columns - 2);
+        const int y0 = std::min(static_cast<int>(y), rows - 2);
+        const float a = x - static_cast<float>(x0), b = y - static_cast<float>(y0);
+        const auto texel = [&](int dx, int dy) { return gathered.at<cv::Vec3f>(y0 + dy, x0 + dx); };
+        total_.at<cv::Vec3f>(at) = direct_.at<cv::Vec3f>(at) +
+                                   (1 - b) * ((1 - a) * texel(0, 0) + a * texel(1, 0)) +
+                                   b * ((1 - a) * texel(0, 1) + a * texel(1, 1));
+      }
+    }
+  }
+
+  cv::Vec3f GatherAll(const SurfacePoint& at) const {
+    const Eigen::Vector3f side =
+        at.normal
+            .cross(std::abs(at.normal.x()) < 0.7f ? Eigen::Vector3f::UnitX()
+                                                  : Eigen::Vector3f::UnitY())
+            .normalized();
+    Eigen::Matrix3f basis;
+    basis << side, at.normal.cross(side), at.normal;
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    for (const Eigen::Vector3f& d : spiral_) sum += Gather(at.position, basis * d);
+    sum /= kBounceRays;
+    return {sum.x(), sum.y(), sum.z()};
   }
 
   /// Light that comes from `direction`: reflected there, plus what must have bounced before.

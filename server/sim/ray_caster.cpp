@@ -40,34 +40,24 @@ RayCaster::RayCaster(const RoomScene& scene) {
 }
 
 void RayCaster::Build(std::uint32_t node, std::uint32_t first, std::uint32_t count) {
-  Eigen::Array3f low = Eigen::Array3f::Constant(1e9f), high = -low;
-  Eigen::Array3f centre_low = low, centre_high = high;
-  const auto centre = [](const Triangle& t) { return (t.a + (t.edge1 + t.edge2) / 3.0f).array(); };
+  Bounds bounds, centres;
   for (std::uint32_t i = first; i < first + count; ++i) {
-    const Triangle& t = triangles_[i];
-    for (const Eigen::Vector3f& p :
-         {t.a, Eigen::Vector3f(t.a + t.edge1), Eigen::Vector3f(t.a + t.edge2)}) {
-      low = low.min(p.array());
-      high = high.max(p.array());
-    }
-    const Eigen::Array3f c = centre(t);
-    centre_low = centre_low.min(c);
-    centre_high = centre_high.max(c);
+    bounds.Add(BoundsOf(triangles_[i]));
+    centres.Add(BoundsOf(triangles_[i]).Centre());
   }
-  nodes_[node].low = low - 1e-4f;
-  nodes_[node].high = high + 1e-4f;
-  if (count <= kLeafSize) {
+  nodes_[node].low = bounds.low - 1e-4f;
+  nodes_[node].high = bounds.high + 1e-4f;
+  const Split split = count > kLeafSize ? BestSplit(first, count, centres) : Split{};
+  if (split.axis < 0) {
     nodes_[node].first = first;
     nodes_[node].count = count;
     return;
   }
-  int axis = 0;
-  (centre_high - centre_low).maxCoeff(&axis);
-  const std::uint32_t half = count / 2;
   const auto begin = triangles_.begin() + first;
-  std::nth_element(begin, begin + half, begin + count, [&](const Triangle& a, const Triangle& b) {
-    return centre(a)[axis] < centre(b)[axis];
+  const auto middle = std::partition(begin, begin + count, [&](const Triangle& t) {
+    return BoundsOf(t).Centre()[split.axis] < split.position;
   });
+  const auto half = static_cast<std::uint32_t>(middle - begin);
   const auto left = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
   nodes_.emplace_back();
@@ -76,15 +66,72 @@ void RayCaster::Build(std::uint32_t node, std::uint32_t first, std::uint32_t cou
   Build(left + 1, first + half, count - half);
 }
 
+RayCaster::Bounds RayCaster::BoundsOf(const Triangle& t) {
+  Bounds bounds;
+  bounds.Add(t.a.array());
+  bounds.Add((t.a + t.edge1).array());
+  bounds.Add((t.a + t.edge2).array());
+  return bounds;
+}
+
+/// The plane of 12 per axis with the least expected work (surface area heuristic).
+RayCaster::Split RayCaster::BestSplit(std::uint32_t first, std::uint32_t count,
+                                      const Bounds& centres) const {
+  constexpr int kBins = 12;
+  Split best;
+  float least = 1e30f;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float low = centres.low[axis], extent = centres.high[axis] - low;
+    if (extent < 1e-6f) continue;
+    std::array<Bounds, kBins> bins;
+    std::array<std::uint32_t, kBins> counts{};
+    for (std::uint32_t i = first; i < first + count; ++i) {
+      const Bounds b = BoundsOf(triangles_[i]);
+      const auto bin = static_cast<std::size_t>(
+          std::min((b.Centre()[axis] - low) / extent * kBins, kBins - 1.0f));
+      bins[bin].Add(b);
+      ++counts[bin];
+    }
+    for (int cut = 1; cut < kBins; ++cut) {
+      Bounds left, right;
+      std::uint32_t left_count = 0, right_count = 0;
+      for (std::size_t k = 0; k < kBins; ++k) {
+        const bool is_left = static_cast<int>(k) < cut;
+        (is_left ? left : right).Add(bins[k]);
+        (is_left ? left_count : right_count) += counts[k];
+      }
+      if (left_count == 0 || right_count == 0) continue;
+      const float cost = left.HalfArea() * static_cast<float>(left_count) +
+                         right.HalfArea() * static_cast<float>(right_count);
+      if (cost < least) {
+        least = cost;
+        best = {axis, low + extent * static_cast<float>(cut) / kBins};
+      }
+    }
+  }
+  // Rounding may have put a centre on the other side of the plane: then this stays a leaf.
+  if (best.axis >= 0) {
+    const auto below = static_cast<std::uint32_t>(std::count_if(
+        triangles_.begin() + first, triangles_.begin() + first + count,
+        [&](const Triangle& t) { return BoundsOf(t).Centre()[best.axis] < best.position; }));
+    if (below == 0 || below == count) best.axis = -1;
+  }
+  return best;
+}
+
 template <bool kAny>
 std::optional<RayHit> RayCaster::Trace(const Eigen::Vector3f& origin,
                                        const Eigen::Vector3f& direction, float max_distance) const {
   const Eigen::Array3f inverse = direction.array().inverse();
   RayHit best;
   best.distance = max_distance;
-  std::array<std::uint32_t, 64> stack;
+  struct Pending {
+    std::uint32_t node;
+    float near;
+  };
+  std::array<Pending, 128> stack;
   std::size_t depth = 0;
-  stack[depth++] = 0;
+  stack[depth++] = {0, 0};
   const auto enter = [&](const Node& node) {
     const Eigen::Array3f a = (node.low - origin.array()) * inverse;
     const Eigen::Array3f b = (node.high - origin.array()) * inverse;
@@ -92,14 +139,17 @@ std::optional<RayHit> RayCaster::Trace(const Eigen::Vector3f& origin,
     return near <= far && far >= 0 && near < best.distance ? near : 1e10f;
   };
   while (depth > 0) {
-    const Node& node = nodes_[stack[--depth]];
+    const Pending pending = stack[--depth];
+    if (pending.near >= best.distance) continue;
+    const Node& node = nodes_[pending.node];
     if (node.count == 0) {
       const float left = enter(nodes_[node.first]), right = enter(nodes_[node.first + 1]);
+      const Pending a{node.first, left}, b{node.first + 1, right};
       const bool left_first = left < right;
-      const std::uint32_t near = node.first + (left_first ? 0 : 1);
-      const std::uint32_t far = node.first + (left_first ? 1 : 0);
-      if (std::max(left, right) < 1e9f) stack[depth++] = far;
-      if (std::min(left, right) < 1e9f) stack[depth++] = near;
+      const Pending& near = left_first ? a : b;
+      const Pending& far = left_first ? b : a;
+      if (far.near < 1e9f && depth < stack.size()) stack[depth++] = far;
+      if (near.near < 1e9f && depth < stack.size()) stack[depth++] = near;
       continue;
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {

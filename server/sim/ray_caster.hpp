@@ -44,6 +44,29 @@ class RayCaster {
     std::uint32_t count = 0;  // 0: inner node
   };
 
+  struct Bounds {
+    Eigen::Array3f low = Eigen::Array3f::Constant(1e9f), high = Eigen::Array3f::Constant(-1e9f);
+    void Add(const Eigen::Array3f& point) {
+      low = low.min(point);
+      high = high.max(point);
+    }
+    void Add(const Bounds& other) {
+      low = low.min(other.low);
+      high = high.max(other.high);
+    }
+    Eigen::Array3f Centre() const { return 0.5f * (low + high); }
+    float HalfArea() const {
+      const Eigen::Array3f size = (high - low).max(0.0f);
+      return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
+    }
+  };
+  struct Split {
+    int axis = -1;  // < 0: none is worth it
+    float position = 0;
+  };
+
+  static Bounds BoundsOf(const Triangle& t);
+  Split BestSplit(std::uint32_t first, std::uint32_t count, const Bounds& centres) const;
   void Build(std::uint32_t node, std::uint32_t first, std::uint32_t count);
   template <bool kAny>
   std::optional<RayHit> Trace(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,

@@ -27,7 +27,7 @@ AreaLight RoomLight(const RoomBuilder& room, const Eigen::Vector3f& centre,
 }
 
 std::vector<AreaLight> Lights(const RoomBuilder& room) {
-  const Eigen::Vector3f day(6.0f, 6.9f, 8.0f), lamp(11.5f, 10.9f, 9.6f), desk_lamp(22, 17, 11);
+  const Eigen::Vector3f day(10.0f, 11.2f, 12.6f), lamp(20.0f, 19.0f, 17.0f), desk_lamp(40, 31, 20);
   return {
       RoomLight(room, {0.03f, 1.5f, 2.45f}, {0, 0, 0.62f}, {0, 0.57f, 0}, {1, 0, 0}, day, 4),
       RoomLight(room, {1.5f, 2.46f, 1.8f}, {0.29f, 0, 0}, {0, 0, 0.29f}, {0, -1, 0}, lamp, 3),

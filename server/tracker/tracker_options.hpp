@@ -22,31 +22,31 @@ struct TrackerOptions {
   double angular_acceleration_sigma_rad_s2 = 6.0;
 
   // Filter.
-  bool fej = true;          // Jacobians at first estimates (slam-spec 1); false: at current ones
-  bool range_only = false;  // ESID: bearings frozen at birth; false: SID, bearing and range
-  double pixel_sigma_px = 0.5;      // of a match at the picture's centre
-  double pixel_sigma_growth = 1.0;  // of it at the corner: sigma (1 + growth d / d_max) [SL2]
-  double outlier_px = 0.0;          // reserved floor of the robust scale; 0: from pixel_sigma_px
+  bool fej = true;                  // Jacobians at first estimates (slam-spec 1)
+  bool range_only = false;          // ESID: bearings frozen at birth; false: SID
+  double pixel_sigma_px = 0.5;      // of a match at the picture's centre, lens and warp included
+  double pixel_sigma_growth = 1.0;  // sigma (1 + growth d / d_max): lens models fit worse outside
+  double robust_cutoff = 4.5;       // Mahalanobis distance from which a match is ignored
 
-  // Search.
+  // Search (slam-spec 5.1).
   int first_stage = 20;         // features searched widely, for the robust pose
   int measured_per_frame = 70;  // 50 to 60 are enough, 100 safe (findings)
-  double gate_sigma = 3.0;      // half axis of the search ellipse (p = 0.989)
-  double max_nssd = 0.40;       // NCC 0.80 [SL2, CV]
+  double gate_sigma = 3.0;      // half axis of the search ellipse: p = 0.989
+  double max_nssd = 0.40;       // NCC 0.80
   int patch_px = 11;            // side of the compared patch
 
   // Map.
   int features_in_view = 60;         // new ones are started below
   int max_features = 250;            // in the filter; update time grows with the square
   int births_per_clone = 15;         // features that share one pose clone (slam-spec 5.4)
-  double corner_min_score = 2000.0;  // of CornerOptions; plain walls must still give some
-  double initial_depth_m = 1.0;      // of first features without a target: sets the scale
+  double corner_min_score = 2000.0;  // see CornerOptions; plain walls must still give some
+  double initial_depth_m = 1.0;      // of the first features without a target: sets the scale
 
   // State machine (slam-spec 2).
   int coasting_below = 5;     // accepted matches a frame
-  int lost_after_bad = 3;     // frames in a row with bad quality [PT]
+  int lost_after_bad = 3;     // frames in a row with bad quality
   int lost_after_blind = 15;  // frames in a row without a match
-  int target_frames = 30;     // a chessboard target is used this long
+  int target_frames = 30;     // a chessboard target is used this long, and any is waited for
 
   /// InvalidArgument names the field, its value and its range.
   absl::Status Validate() const;

@@ -187,7 +187,7 @@ function kannalaBrandt(distortion: readonly number[]): Lens {
     distort: (p) => {
       const r = Math.hypot(p.x, p.y);
       const angle = Math.atan2(r, p.z);
-      if (!(r + Math.abs(p.z) > MIN_DEPTH) || angle > maxAngle) return undefined;
+      if (p.z <= MIN_DEPTH || angle > maxAngle) return undefined;
       if (r < 1e-12) return { x: 0, y: 0 };
       const bent = bend(angle);
       return { x: (bent * p.x) / r, y: (bent * p.y) / r };

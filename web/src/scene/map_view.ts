@@ -24,6 +24,8 @@ export interface ShownFrame {
 export class MapView {
   readonly orbit = new OrbitCamera();
   following = false;
+  /** Least time between two live pictures in the map: on slow computers the video goes first. */
+  pictureIntervalMs = 0;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
   private readonly eye = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 1000);
@@ -35,6 +37,7 @@ export class MapView {
   private framed: { centre: Vec3; radius: number } | undefined;
   private held = false; // by hand: no more framing by itself
   private lastMs = 0;
+  private contentMs = -Infinity;
   private shownFrame = -1;
   private dirty = true;
 
@@ -94,9 +97,7 @@ export class MapView {
   draw(nowMs: number, shown: ShownFrame | undefined): boolean {
     const elapsed = Math.min(nowMs - this.lastMs, 100);
     this.lastMs = nowMs;
-    if (this.cloud.update(this.session.map)) this.dirty = true;
-    if (this.path.update(this.session.path)) this.dirty = true;
-    this.updateFrustum(shown);
+    if (nowMs - this.contentMs >= this.pictureIntervalMs) this.updateContent(nowMs, shown);
     this.steer(shown);
     if (this.orbit.step(elapsed)) this.dirty = true;
     if (!this.dirty || this.width === 0) return false;
@@ -108,6 +109,13 @@ export class MapView {
     this.eye.quaternion.set(q.x, q.y, q.z, q.w);
     this.renderer.render(this.scene, this.eye);
     return true;
+  }
+
+  private updateContent(nowMs: number, shown: ShownFrame | undefined): void {
+    this.contentMs = nowMs;
+    if (this.cloud.update(this.session.map)) this.dirty = true;
+    if (this.path.update(this.session.path)) this.dirty = true;
+    this.updateFrustum(shown);
   }
 
   private updateFrustum(shown: ShownFrame | undefined): void {

@@ -3,14 +3,14 @@ interface Sample {
   readonly roundTripMs: number;
 }
 
-/** Offset of the server's clock from this page's, from pings as in NTP: the quickest of the last 8. */
+/** Offset of the server's clock from this page's, from pings as in NTP: the quickest of the last 16. */
 export class ClockOffset {
   private samples: Sample[] = [];
 
   /** All times in ms; t0 and t3 on this page's clock, t1 and t2 on the server's. */
   add(t0: number, t1: number, t2: number, t3: number): void {
     this.samples.push({ offsetMs: (t1 - t0 + (t2 - t3)) / 2, roundTripMs: t3 - t0 - (t2 - t1) });
-    if (this.samples.length > 8) this.samples.shift();
+    if (this.samples.length > 16) this.samples.shift();
   }
 
   /** Server time = page time + this; undefined before the first ping. */
@@ -33,6 +33,21 @@ export class ClockOffset {
     }
     return best;
   }
+}
+
+/**
+ * When the browser itself sent the last request whose address ends in `suffix`, and when its answer
+ * began to arrive [ms, this page's clock]. The page's own stamps would include its waiting.
+ */
+export function wireTimes(suffix: string): { sentMs: number; answeredMs: number } | undefined {
+  const entries = performance.getEntriesByType('resource') as PerformanceResourceTiming[];
+  const last = entries.filter(({ name }) => name.endsWith(suffix)).at(-1);
+  performance.clearResourceTimings(); // else the browser stops recording at 250
+  if (!last || last.requestStart === 0 || last.responseStart === 0) return undefined;
+  return {
+    sentMs: performance.timeOrigin + last.requestStart,
+    answeredMs: performance.timeOrigin + last.responseStart,
+  };
 }
 
 /** This page's clock [ms], the same in its workers. */

@@ -7,7 +7,7 @@ import { Backoff } from '../transport/backoff';
 import { describeError, isRefusal } from '../transport/errors';
 import { Acknowledger } from './acknowledger';
 import { AnnotationBook } from './annotation_book';
-import { ClockOffset, pageNowMs } from './clock';
+import { ClockOffset, pageNowMs, wireTimes } from './clock';
 import { pbRoles, toIntrinsics, toParticipant, toPose, toStages } from './convert';
 import { MapState } from './map_state';
 import { FrameRing } from './ring';
@@ -111,7 +111,7 @@ export class Session {
     const timers = [
       setInterval(() => this.watch(attempt), 500),
       setInterval(() => void this.ping(signal), PING_MS),
-      setInterval(() => this.acknowledger?.flush(), 30),
+      setInterval(() => this.acknowledger?.flush(), 100),
     ];
     try {
       void this.ping(signal);
@@ -163,7 +163,9 @@ export class Session {
       );
       const t1 = Number(reply.serverReceiveNs) / 1e6;
       const t2 = Number(reply.serverSendNs) / 1e6;
-      this.clock.add(sent, t1, t2, pageNowMs());
+      const answered = pageNowMs();
+      const wire = wireTimes('/Ping');
+      this.clock.add(wire?.sentMs ?? sent, t1, t2, wire?.answeredMs ?? answered);
     } catch {
       // The stream's silence says the same, and says it to the reader.
     }

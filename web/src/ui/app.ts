@@ -15,6 +15,7 @@ import { Strip } from './strip';
 import { ToolsColumn } from './tools_column';
 import { VideoPane } from './video_pane';
 
+const MAP_AT_LATEST_MS = 1500;
 const PANEL_MS = 200; // moving numbers change five times a second: readable
 
 /** The expert's page: builds it, and draws it once per screen frame. */
@@ -31,6 +32,7 @@ export class App {
   private readonly tools: ToolsColumn;
   private readonly annotations: AnnotationsPanel;
   private readonly stage = h('main', {});
+  private mapLoading = false;
   private panelsMs = 0;
   private panelsVersion = '';
 
@@ -60,8 +62,15 @@ export class App {
   }
 
   start(): void {
-    void this.map.load();
+    // The first picture comes first; three.js, the larger part of the page, after it.
+    setTimeout(() => this.loadMap(), MAP_AT_LATEST_MS);
     requestAnimationFrame((nowMs) => this.frame(nowMs));
+  }
+
+  private loadMap(): void {
+    if (this.mapLoading) return;
+    this.mapLoading = true;
+    void this.map.load();
   }
 
   private frame(nowMs: number): void {
@@ -69,9 +78,13 @@ export class App {
     this.screen.add(nowMs);
     const { state, session, player } = this;
     this.stage.dataset['main'] = state.main;
-    if (player.draw()) this.measure();
+    if (player.draw()) {
+      this.measure();
+      if (!this.mapLoading) this.element.dataset['firstPictureMs'] = performance.now().toFixed(0);
+      this.loadMap();
+    }
     this.video.draw();
-    this.map.draw(nowMs);
+    this.map.draw(nowMs, this.screen.rate(nowMs));
     state.expire(nowMs);
     const version = `${state.version} ${session.annotations.version} ${session.link.kind}`;
     if (version === this.panelsVersion && nowMs - this.panelsMs < PANEL_MS) return;

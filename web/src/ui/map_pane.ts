@@ -54,13 +54,15 @@ export class MapPane {
     return { u: clientX - box.left - 0.5, v: clientY - box.top - 0.5 };
   }
 
-  draw(nowMs: number): void {
+  /** `screenFps`: what this computer manages; with little, the map yields to the video. */
+  draw(nowMs: number, screenFps: number): void {
     const { map, element } = this;
     this.updateNote();
     if (!map) return;
     const width = element.clientWidth;
     const height = element.clientHeight;
     map.resize(width, height);
+    map.pictureIntervalMs = screenFps > 0 && screenFps < 45 ? 150 : 0;
     const shown = this.player.shown?.facts;
     const pose = shown?.pose;
     const placed = shown && pose && pose.status !== 'initialising' && pose.status !== 'unknown';

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <optional>
+
+#include "shared/camera/camera_model.hpp"
+#include "shared/geometry/rigid3.hpp"
+
+namespace saccade {
+
+/// How a feature is written in the state.
+enum class PointForm {
+  kBearingRange,  // SID: unit bearing (2-D tangent) and inverse range in a clone of the camera
+  kRangeOnly,     // ESID: the same with the bearing frozen; 1 number
+};
+
+/// A point seen from an anchor pose: direction and inverse range there.
+struct AnchoredPoint {
+  Rigid3 world_from_anchor;
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // unit, in the anchor
+  Eigen::Matrix<double, 3, 2> basis;                   // tangent of the bearing: b [+] d
+  double inverse_range = 1.0;  // [1/m]; may be slightly below 0 while uncertain
+};
+
+/// Some orthonormal basis of the plane normal to the unit vector `bearing`.
+Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& bearing);
+
+/// Moves a bearing by `error` in its tangent plane and carries the basis along (no twist, so that
+/// the covariance needs no correction to first order).
+void MoveBearing(const Eigen::Vector2d& error, Eigen::Vector3d& bearing,
+                 Eigen::Matrix<double, 3, 2>& basis);
+
+/// Where a point appears, and how that depends on everything.
+struct PixelPrediction {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // [px, distorted]
+  /// Direction of the point in the camera, scaled: X = R b + rho t for anchored points [1],
+  /// the point itself for fixed ones [m].
+  Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix<double, 2, 6> d_camera;  // [position, rotation] of the camera
+  Eigen::Matrix<double, 2, 6> d_anchor;  // [position, rotation] of the anchor
+  Eigen::Matrix<double, 2, 3> d_point;   // [bearing tangent (2), inverse range]
+};
+
+/// Projects an anchored point; nothing if it is behind the camera or outside the lens.
+std::optional<PixelPrediction> PredictAnchored(const CameraModel& camera,
+                                               const Rigid3& world_from_camera,
+                                               const AnchoredPoint& point);
+/// Projects a fixed point [m, world]; d_anchor and d_point are not set.
+std::optional<PixelPrediction> PredictFixed(const CameraModel& camera,
+                                            const Rigid3& world_from_camera,
+                                            const Eigen::Vector3d& point_in_world);
+/// Pixel only, of either.
+std::optional<Eigen::Vector2d> PixelOfAnchored(const CameraModel& camera,
+                                               const Rigid3& world_from_camera,
+                                               const AnchoredPoint& point);
+
+}  // namespace saccade

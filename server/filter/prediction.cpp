@@ -1,0 +1,112 @@
+// The part of FilterState that says where things are seen and how sure that is.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "server/filter/filter_state.hpp"
+
+namespace saccade {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+/// Covariance of [camera pose, anchor pose, point] and its Jacobians, in one small matrix.
+constexpr int kMostColumns = 15;
+using SmallMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
+using SmallRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, kMostColumns>;
+
+SmallMatrix Gather(const Covariance& p, int anchor, int point, int point_dim) {
+  const int size = 12 + point_dim;
+  std::array<int, kMostColumns> rows{};
+  for (int k = 0; k < 6; ++k) {
+    rows[k] = k;
+    rows[6 + k] = anchor + k;
+  }
+  for (int k = 0; k < point_dim; ++k) rows[12 + k] = point + k;
+  SmallMatrix block(size, size);
+  for (int c = 0; c < size; ++c) {
+    for (int r = c; r < size; ++r) block(r, c) = block(c, r) = p.at(rows[r], rows[c]);
+  }
+  return block;
+}
+
+}  // namespace
+
+std::optional<PixelPrediction> FilterState::Linearise(const CameraModel& camera, const Rigid3& pose,
+                                                      const Feature& feature) const {
+  auto current = PredictAnchored(camera, pose, Point(feature, false));
+  if (!current || !options_.fej) return current;
+  const auto first = PredictAnchored(camera, pose, Point(feature, true));
+  if (!first) return current;
+  PixelPrediction mixed = *first;
+  mixed.pixel = current->pixel;
+  mixed.ray = current->ray;
+  return mixed;
+}
+
+std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
+                                                     FeatureId id) const {
+  const Feature* feature = Find(id);
+  if (feature == nullptr) return std::nullopt;
+  const auto at = Linearise(camera, camera_.world_from_camera, *feature);
+  if (!at) return std::nullopt;
+  const int size = FeatureDim();
+  const SmallMatrix p = Gather(covariance_, AnchorOf(*feature).offset, feature->offset, size);
+  SmallRows h(2, 12 + size);
+  h << at->d_camera, at->d_anchor, at->d_point.rightCols(size);
+  const SmallRows hp = h * p;
+  PredictedPixel result{*at, hp * h.transpose(), hp.leftCols<6>()};
+  if (size == 1) {
+    const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
+    result.covariance += d_bearing * feature->frozen_covariance * d_bearing.transpose();
+  }
+  return result;
+}
+
+std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
+                                                     const Vector3d& known_point) const {
+  const auto at = PredictFixed(camera, camera_.world_from_camera, known_point);
+  if (!at) return std::nullopt;
+  const Eigen::Matrix<double, 2, 6> hp = at->d_camera * PoseCovariance();
+  return PredictedPixel{*at, hp * at->d_camera.transpose(), hp};
+}
+
+FeatureMarginal FilterState::Marginal(FeatureId id) const {
+  FeatureMarginal marginal;
+  const Feature* feature = Find(id);
+  if (feature == nullptr) return marginal;
+  const Anchor& anchor = AnchorOf(*feature);
+  const int size = FeatureDim();
+  const SmallMatrix p = Gather(covariance_, anchor.offset, feature->offset, size);
+  const double rho = std::max(feature->inverse_range, options_.min_inverse_range);
+  const Matrix3d world_from_anchor = anchor.pose.RotationMatrix();
+  const Vector3d in_anchor = feature->bearing / rho;
+  marginal.inverse_range = feature->inverse_range;
+  marginal.inverse_range_sigma = std::sqrt(std::max(0.0, p(11 + size, 11 + size)));
+  marginal.point_in_world = anchor.pose * in_anchor;
+  Eigen::Matrix<double, 3, 3> d_point;  // by [bearing tangent, inverse range]
+  d_point.leftCols<2>() = world_from_anchor * feature->basis / rho;
+  d_point.col(2) = world_from_anchor * in_anchor / -rho;
+  SmallRows in_world(3, 12 + size);
+  in_world << Eigen::Matrix<double, 3, 6>::Zero(), Matrix3d::Identity(),
+      -world_from_anchor * Skew(in_anchor), d_point.rightCols(size);
+  const Rigid3 camera_from_world = camera_.world_from_camera.Inverse();
+  const Matrix3d turn = camera_from_world.RotationMatrix();
+  SmallRows in_camera = turn * in_world;
+  in_camera.leftCols<3>() = -turn;
+  in_camera.middleCols<3>(3) = Skew(camera_from_world * marginal.point_in_world);
+  marginal.covariance_in_world = in_world * p * in_world.transpose();
+  marginal.covariance_in_camera = in_camera * p * in_camera.transpose();
+  if (size == 1) {
+    const Matrix3d frozen =
+        d_point.leftCols<2>() * feature->frozen_covariance * d_point.leftCols<2>().transpose();
+    marginal.covariance_in_world += frozen;
+    marginal.covariance_in_camera += turn * frozen * turn.transpose();
+  }
+  return marginal;
+}
+
+}  // namespace saccade

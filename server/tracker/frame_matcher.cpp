@@ -1,0 +1,190 @@
+#include "server/tracker/frame_matcher.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace saccade {
+namespace {
+
+constexpr double kBorder_px = 6.0;   // half a patch: nearer to the edge nothing can be compared
+constexpr double kWidest_px = 30.0;  // sigma of the widest ellipse that is searched
+
+SearchOptions MakeSearchOptions(const TrackerOptions& options) {
+  SearchOptions search;
+  search.max_nssd = options.max_nssd;
+  search.gate_squared = options.gate_sigma * options.gate_sigma;
+  search.max_sigma_px = kWidest_px;
+  return search;
+}
+
+/// Pose, direction and inverse range from where the landmark's patch was seen.
+AnchoredPoint FromBirth(const Landmark& landmark,
+                        const std::variant<AnchoredPoint, Eigen::Vector3d>& point) {
+  if (std::holds_alternative<AnchoredPoint>(point)) return std::get<AnchoredPoint>(point);
+  AnchoredPoint from;
+  from.world_from_anchor = landmark.known->world_from_birth;
+  const Eigen::Vector3d seen =
+      landmark.known->world_from_birth.Inverse() * std::get<Eigen::Vector3d>(point);
+  from.bearing = seen.normalized();
+  from.inverse_range = 1.0 / seen.norm();
+  return from;
+}
+
+}  // namespace
+
+FrameMatcher::FrameMatcher(const TrackerOptions& options)
+    : options_(options), searcher_(MakeSearchOptions(options)) {
+  warp_.size = options.patch_px;
+}
+
+double FrameMatcher::PixelSigma(const CameraModel& camera, const Eigen::Vector2d& pixel) const {
+  const CameraIntrinsics& lens = camera.intrinsics();
+  const Eigen::Vector2d centre(lens.cx, lens.cy);
+  const double farthest = 0.5 * std::hypot(lens.width, lens.height);
+  const double share = std::min(1.5, (pixel - centre).norm() / farthest);
+  return options_.pixel_sigma_px * (1.0 + options_.pixel_sigma_growth * share);
+}
+
+std::vector<LandmarkMatch> FrameMatcher::Visible(const CameraModel& camera,
+                                                 const FilterState& filter,
+                                                 const LandmarkMap& map) const {
+  std::vector<LandmarkMatch> in_view;
+  in_view.reserve(map.all().size());
+  for (const Landmark& landmark : map.all()) {
+    const auto predicted = landmark.known ? filter.Predicted(camera, landmark.known->point_in_world)
+                                          : filter.Predicted(camera, landmark.id);
+    if (!predicted || !camera.InImage(predicted->at.pixel, kBorder_px)) continue;
+    LandmarkMatch match;
+    match.id = landmark.id;
+    match.predicted = *predicted;
+    if (landmark.known) {
+      match.point = landmark.known->point_in_world;
+    } else {
+      match.point = filter.Point(landmark.id);
+    }
+    match.pixel = predicted->at.pixel;
+    in_view.push_back(std::move(match));
+  }
+  return in_view;
+}
+
+std::vector<int> FrameMatcher::Order(const CameraModel& camera,
+                                     const std::vector<LandmarkMatch>& in_view,
+                                     const LandmarkMap& map, std::mt19937_64& random) const {
+  constexpr int kColumns = 6, kRows = 5;
+  struct Entry {
+    double worth;
+    int index;
+  };
+  std::array<std::vector<Entry>, kColumns * kRows> cells;
+  for (std::size_t k = 0; k < in_view.size(); ++k) {
+    const Landmark& landmark = *map.Find(in_view[k].id);
+    // Old and reliable first; a little chance, so that equals take turns.
+    const double age = std::min<double>(landmark.matched, 100.0);
+    const double worth = landmark.recent * (landmark.known ? 200.0 : 10.0 + age) *
+                         (0.8 + 0.4 * static_cast<double>(random() % 1000) / 1000.0);
+    const Eigen::Vector2d& at = in_view[k].pixel;
+    const int column =
+        std::clamp(static_cast<int>(at.x() * kColumns / camera.width()), 0, kColumns - 1);
+    const int row = std::clamp(static_cast<int>(at.y() * kRows / camera.height()), 0, kRows - 1);
+    cells[row * kColumns + column].push_back({worth, static_cast<int>(k)});
+  }
+  std::vector<std::pair<int, Entry>> ranked;  // rank within the cell
+  for (std::vector<Entry>& cell : cells) {
+    std::sort(cell.begin(), cell.end(), [](const Entry& a, const Entry& b) {
+      return a.worth != b.worth ? a.worth > b.worth : a.index < b.index;
+    });
+    for (std::size_t k = 0; k < cell.size(); ++k) ranked.emplace_back(static_cast<int>(k), cell[k]);
+  }
+  std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) {
+    if (a.first != b.first) return a.first < b.first;
+    if (a.second.worth != b.second.worth) return a.second.worth > b.second.worth;
+    return a.second.index < b.second.index;
+  });
+  std::vector<int> order;
+  for (const auto& [rank, entry] : ranked) order.push_back(entry.index);
+  return order;
+}
+
+void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera,
+                          const LandmarkMap& map, const PosePrior& prior, const Rigid3& pose,
+                          const Matrix6d& pose_covariance, LandmarkMatch& match) {
+  const Landmark& landmark = *map.Find(match.id);
+  const Eigen::LLT<Matrix6d> factor(prior.covariance);
+  const auto expected = PixelGivenPose(camera, prior, factor, match.point, match.predicted, pose);
+  match.found = false;
+  match.weight = 0.0;
+  if (!expected || !camera.InImage(expected->pixel, kBorder_px)) return;
+  match.pixel = expected->pixel;
+  const AnchoredPoint birth = FromBirth(landmark, match.point);
+  const WarpStatus warped =
+      WarpPatch(landmark.patch, pose.Inverse() * birth.world_from_anchor, birth.bearing,
+                std::max(0.0, birth.inverse_range), Eigen::Vector3d::Zero(), camera,
+                expected->pixel, warp_, warped_);
+  if (warped != WarpStatus::kOk) return;  // not seen from here: no attempt
+  const double sigma = PixelSigma(camera, expected->pixel);
+  const Eigen::Matrix2d spread = expected->d_pose * pose_covariance * expected->d_pose.transpose() +
+                                 expected->covariance + sigma * sigma * Eigen::Matrix2d::Identity();
+  const SearchResult result = searcher_.Find(pyramid, warped_, expected->pixel, spread);
+  if (result.status == SearchStatus::kTooUncertain || result.status == SearchStatus::kOutside ||
+      result.status == SearchStatus::kBadInput) {
+    return;
+  }
+  match.searched = true;
+  match.found = result.found();
+  if (!match.found) return;
+  match.pixel = result.pixel;
+  match.noise = sigma * sigma * Eigen::Matrix2d::Identity() + result.covariance;
+}
+
+RobustPose FrameMatcher::Solve(const CameraModel& camera, const PosePrior& prior,
+                               std::vector<LandmarkMatch>& in_view, std::mt19937_64& random) const {
+  std::vector<PoseEvidence> evidence;
+  std::vector<LandmarkMatch*> used;
+  for (LandmarkMatch& match : in_view) {
+    if (!match.found) continue;
+    evidence.push_back({match.point, match.predicted, match.pixel, match.noise});
+    used.push_back(&match);
+  }
+  RobustPoseOptions robust;
+  robust.cutoff = options_.robust_cutoff;
+  RobustPose pose = EstimateRobustPose(camera, prior, evidence, robust, random);
+  for (std::size_t k = 0; k < used.size(); ++k) used[k]->weight = pose.weights[k];
+  return pose;
+}
+
+FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel& camera,
+                                 const FilterState& filter, const LandmarkMap& map,
+                                 std::mt19937_64& random) {
+  FrameMatches matches;
+  const PosePrior prior{filter.camera().world_from_camera, filter.PoseCovariance()};
+  matches.in_view = Visible(camera, filter, map);
+  std::vector<LandmarkMatch>& in_view = matches.in_view;
+  const std::vector<int> order = Order(camera, in_view, map, random);
+  const int total = std::min<int>(options_.measured_per_frame, static_cast<int>(order.size()));
+  const int first = std::min(options_.first_stage, total);
+  int searched = 0;
+  for (int k = 0; k < first; ++k) {
+    Search(pyramid, camera, map, prior, prior.world_from_camera, prior.covariance,
+           in_view[order[k]]);
+    searched += in_view[order[k]].searched ? 1 : 0;
+  }
+  matches.pose = Solve(camera, prior, in_view, random);
+  matches.surprised = matches.pose.inliers < std::max(4, searched / 3);
+  const bool known = matches.pose.inliers >= 3;
+  const Rigid3 pose = known ? matches.pose.world_from_camera : prior.world_from_camera;
+  const Matrix6d spread = known ? matches.pose.covariance : prior.covariance;
+  for (int k = 0; k < total; ++k) {
+    LandmarkMatch& match = in_view[order[k]];
+    if (match.accepted() || (match.searched && !known)) continue;
+    Search(pyramid, camera, map, prior, pose, spread, match);
+  }
+  matches.pose = Solve(camera, prior, in_view, random);
+  for (const LandmarkMatch& match : in_view) {
+    matches.attempted += match.searched ? 1 : 0;
+    matches.accepted += match.accepted() ? 1 : 0;
+  }
+  return matches;
+}
+
+}  // namespace saccade

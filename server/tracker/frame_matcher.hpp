@@ -1,0 +1,67 @@
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "server/features/search.hpp"
+#include "server/filter/filter_state.hpp"
+#include "server/filter/robust_pose.hpp"
+#include "server/map/landmark.hpp"
+#include "server/tracker/tracker_options.hpp"
+
+namespace saccade {
+
+/// What became of one landmark in one frame.
+struct LandmarkMatch {
+  FeatureId id = 0;
+  PredictedPixel predicted;                            // at the predicted pose
+  std::variant<AnchoredPoint, Eigen::Vector3d> point;  // as the filter has it; known points
+  bool searched = false;
+  bool found = false;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // found, else where it was expected
+  Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();
+  double weight = 0.0;  // of the robust pose; 0: outlier or not found
+
+  bool accepted() const { return found && weight > 0.1; }
+};
+
+struct FrameMatches {
+  std::vector<LandmarkMatch> in_view;  // all landmarks whose prediction is in the picture
+  RobustPose pose;
+  int attempted = 0;
+  int accepted = 0;
+  bool surprised = false;  // few of the first stage agree: the camera moved unexpectedly
+};
+
+/// Finds the map in a picture: a few features widely, a robust pose from them, the rest narrowly
+/// around that, and the pose again (findings; slam-spec 5.1, 5.5).
+class FrameMatcher {
+ public:
+  explicit FrameMatcher(const TrackerOptions& options);
+
+  /// `prior` is the filter's predicted pose; nothing but scratch memory changes.
+  FrameMatches Match(const ImagePyramid& pyramid, const CameraModel& camera,
+                     const FilterState& filter, const LandmarkMap& map, std::mt19937_64& random);
+
+  /// Sigma of a match at `pixel` [px].
+  double PixelSigma(const CameraModel& camera, const Eigen::Vector2d& pixel) const;
+
+ private:
+  std::vector<LandmarkMatch> Visible(const CameraModel& camera, const FilterState& filter,
+                                     const LandmarkMap& map) const;
+  /// Indices into `in_view`, most wanted first, spread over the picture.
+  std::vector<int> Order(const CameraModel& camera, const std::vector<LandmarkMatch>& in_view,
+                         const LandmarkMap& map, std::mt19937_64& random) const;
+  void Search(const ImagePyramid& pyramid, const CameraModel& camera, const LandmarkMap& map,
+              const PosePrior& prior, const Rigid3& pose, const Matrix6d& pose_covariance,
+              LandmarkMatch& match);
+  RobustPose Solve(const CameraModel& camera, const PosePrior& prior,
+                   std::vector<LandmarkMatch>& in_view, std::mt19937_64& random) const;
+
+  TrackerOptions options_;
+  PatchSearcher searcher_;
+  WarpOptions warp_;
+  WarpedPatch warped_;
+};
+
+}  // namespace saccade

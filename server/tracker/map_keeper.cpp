@@ -1,0 +1,126 @@
+#include "server/tracker/map_keeper.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace saccade {
+namespace {
+
+CornerOptions MakeCornerOptions(const TrackerOptions& options) {
+  CornerOptions corner;
+  corner.min_score = options.corner_min_score;
+  corner.border_px = 16;
+  return corner;
+}
+
+constexpr int kDepthFeatures = 8;        // needed to guess the depth of a new one
+constexpr int kFramesBetweenGrowth = 5;  // unless the view is nearly empty
+
+}  // namespace
+
+MapKeeper::MapKeeper(const TrackerOptions& options)
+    : options_(options), detector_(MakeCornerOptions(options)) {}
+
+void MapKeeper::Reset() { frames_since_growth_ = 1000; }
+
+std::optional<MapKeeper::DepthGuess> MapKeeper::GuessDepth(const FilterState& filter,
+                                                           const FrameMatches& matches) {
+  std::vector<double> inverse;
+  const Rigid3 camera_from_world = filter.camera().world_from_camera.Inverse();
+  for (const LandmarkMatch& match : matches.in_view) {
+    double range = 0.0;
+    if (std::holds_alternative<Eigen::Vector3d>(match.point)) {
+      range = (camera_from_world * std::get<Eigen::Vector3d>(match.point)).norm();
+    } else if (filter.Has(match.id)) {
+      const FeatureMarginal marginal = filter.Marginal(match.id);
+      if (marginal.inverse_range_sigma > 0.3 * marginal.inverse_range) continue;
+      range = (camera_from_world * marginal.point_in_world).norm();
+    }
+    if (range > 0.0) inverse.push_back(1.0 / range);
+  }
+  const bool enough = static_cast<int>(inverse.size()) >= kDepthFeatures ||
+                      (inverse.size() >= 3 &&
+                       std::holds_alternative<Eigen::Vector3d>(matches.in_view.front().point));
+  if (!enough) return std::nullopt;
+  std::nth_element(inverse.begin(), inverse.begin() + inverse.size() / 2, inverse.end());
+  const double median = inverse[inverse.size() / 2];
+  return DepthGuess{median, 0.5 * median};
+}
+
+void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map) {
+  std::vector<FeatureId> gone = filter.RemoveBehind();
+  const std::vector<FeatureId> unreliable = Unreliable(map, RetirementOptions());
+  gone.insert(gone.end(), unreliable.begin(), unreliable.end());
+  filter.Remove(unreliable);
+  map.Remove(gone);
+  const int excess = static_cast<int>(filter.feature_count()) - options_.max_features;
+  if (excess > 0) {
+    const std::vector<FeatureId> least = LeastWorth(map, excess, frame);
+    filter.Remove(least);
+    map.Remove(least);
+  }
+}
+
+bool MapKeeper::Wants(const FrameMatches& matches, const FilterState&) const {
+  int usable = 0;
+  for (const LandmarkMatch& match : matches.in_view) {
+    usable += match.searched || match.weight > 0 ? 1 : 0;
+  }
+  const int missing = options_.features_in_view - usable;
+  if (missing <= 0) return false;
+  if (missing > options_.features_in_view / 2) return true;
+  return missing >= options_.features_in_view / 8 && frames_since_growth_ >= kFramesBetweenGrowth;
+}
+
+std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
+                                          const DepthGuess& depth, AnchorPoseId anchor,
+                                          const FrameMatcher& matcher, FilterState& filter,
+                                          LandmarkMap& map) {
+  auto patch = CutPatch(frame.grey, pixel, frame.camera);
+  Eigen::Matrix<double, 3, 2> d_bearing;
+  const auto bearing = frame.camera->Unproject(pixel, &d_bearing);
+  if (!patch.ok() || !bearing) return std::nullopt;
+  WarpedPatch look;
+  if (CopyPatch(*patch, WarpOptions(), look) != WarpStatus::kOk) return std::nullopt;
+  const double sigma = matcher.PixelSigma(*frame.camera, pixel);
+  FeatureBirth birth;
+  birth.id = map.NextId();
+  birth.bearing = *bearing;
+  birth.bearing_covariance = sigma * sigma * d_bearing * d_bearing.transpose();
+  birth.inverse_range = depth.inverse_range;
+  birth.inverse_range_sigma = depth.inverse_range_sigma;
+  if (!filter.AddFeature(anchor, birth).ok()) return std::nullopt;
+  Landmark landmark;
+  landmark.id = birth.id;
+  landmark.patch = *std::move(patch);
+  map.Add(std::move(landmark));
+  return birth.id;
+}
+
+int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
+                    const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
+                    FilterState& filter, LandmarkMap& map, std::mt19937_64& random) {
+  ++frames_since_growth_;
+  if (!everywhere && !Wants(matches, filter)) return 0;
+  std::vector<Eigen::Vector2d> occupied;
+  for (const LandmarkMatch& match : matches.in_view) occupied.push_back(match.pixel);
+  const int wanted = everywhere ? options_.features_in_view : options_.births_per_clone;
+  detector_.DetectAll(pyramid, occupied, 3 * wanted, corners_);
+  if (corners_.empty()) return 0;
+  frames_since_growth_ = 0;
+  // The best third for sure, the rest by chance among what is left: strong corners come in heaps.
+  const int fixed = std::min<int>(wanted / 3, static_cast<int>(corners_.size()));
+  for (std::size_t k = corners_.size(); k > static_cast<std::size_t>(fixed) + 1; --k) {
+    std::swap(corners_[k - 1], corners_[fixed + random() % (k - fixed)]);
+  }
+  const AnchorPoseId anchor = filter.AddAnchor();
+  int planted = 0;
+  for (const Corner& corner : corners_) {
+    if (planted >= wanted) break;
+    planted += Plant(frame, corner.pixel, depth, anchor, matcher, filter, map) ? 1 : 0;
+  }
+  filter.Remove({});  // a clone that nothing was planted in goes again
+  return planted;
+}
+
+}  // namespace saccade

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "server/capture/frame.hpp"
+#include "server/features/corner_detector.hpp"
+#include "server/filter/filter_state.hpp"
+#include "server/map/landmark.hpp"
+#include "server/tracker/frame_matcher.hpp"
+#include "server/tracker/tracker_options.hpp"
+
+namespace saccade {
+
+/// Starts features where they are needed and retires those that are no good (slam-spec 5.6).
+class MapKeeper {
+ public:
+  explicit MapKeeper(const TrackerOptions& options);
+  void Reset();
+
+  /// What features near the camera are taken to be at, before anything is known of them.
+  struct DepthGuess {
+    double inverse_range = 1.0;        // [1/m]
+    double inverse_range_sigma = 0.5;  // [1/m]
+  };
+  /// From the ranges of features in view; nothing if there are too few to tell.
+  static std::optional<DepthGuess> GuessDepth(const FilterState& filter,
+                                              const FrameMatches& matches);
+
+  /// Removes what is unreliable or impossible, and, in a full map, what is worth least.
+  void Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map);
+  /// Starts features in a new pose clone, where the picture has corners and the map has none.
+  /// `everywhere`: as many as the map wants in view (the first frame). Returns how many.
+  int Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
+           const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
+           FilterState& filter, LandmarkMap& map, std::mt19937_64& random);
+  /// Starts one feature at a pixel; nothing if there is no texture or no room for a patch.
+  std::optional<FeatureId> Plant(const Frame& frame, const Eigen::Vector2d& pixel,
+                                 const DepthGuess& depth, AnchorPoseId anchor,
+                                 const FrameMatcher& matcher, FilterState& filter,
+                                 LandmarkMap& map);
+  /// True if Grow() would start features now.
+  bool Wants(const FrameMatches& matches, const FilterState& filter) const;
+
+ private:
+  TrackerOptions options_;
+  CornerDetector detector_;
+  std::vector<Corner> corners_;
+  int frames_since_growth_ = 1000;
+};
+
+}  // namespace saccade

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <deque>
+#include <string>
+
+#include "server/tracker/tracker_options.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+namespace saccade {
+
+/// Decides from the matches of each frame how tracking is (slam-spec section 2).
+class StatusMonitor {
+ public:
+  explicit StatusMonitor(const TrackerOptions& options) : options_(options) {}
+
+  /// Back to the start.
+  void Reset();
+  /// A frame without a map yet.
+  void WaitForStart() { status_ = TrackingStatus::kInitialising; }
+  /// The outcome of one frame that was searched. `settled`: the map's depths are known well enough
+  /// to publish poses; until then the status is initialising.
+  void Record(int attempted, int accepted, bool settled);
+  /// Tracking was lost, and now the camera may be found again: three frames must confirm it.
+  void BeginRelocalisation();
+
+  TrackingStatus status() const { return status_; }
+  TrackingQuality quality() const { return quality_; }
+  /// True if a relocalisation was refused by the frames after it.
+  bool refused() const { return refused_; }
+  /// Part of attempted searches that succeeded over the last 10 frames; 1 if none was attempted.
+  double ratio() const;
+
+ private:
+  void Confirm(int attempted, int accepted);
+
+  TrackerOptions options_;
+  TrackingStatus status_ = TrackingStatus::kInitialising;
+  TrackingQuality quality_ = TrackingQuality::kUnknown;
+  struct Counts {
+    int attempted, accepted;
+  };
+  std::deque<Counts> window_;
+  int bad_in_row_ = 0;
+  int blind_in_row_ = 0;
+  int confirming_ = 0;  // frames left
+  int confirmed_ = 0;
+  bool refused_ = false;
+};
+
+/// What the wearer can do about it, in words; empty if all is well.
+std::string AdviceFor(const StatusMonitor& monitor, bool waits_for_target, double speed_rad_s,
+                      int in_view);
+
+}  // namespace saccade

@@ -1,0 +1,185 @@
+// The command line against the real server, which plays a small data set made here.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/integration/support/process.hpp"
+#include "tests/integration/support/small_dataset.hpp"
+
+namespace saccade::testing {
+namespace {
+
+using nlohmann::json;
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+
+RunResult Saccade(std::vector<std::string> arguments, const std::string& state_folder) {
+  arguments.insert(arguments.begin(), SACCADE_PROGRAM);
+  return RunProgram(arguments, seconds(20), {"XDG_STATE_HOME=" + state_folder});
+}
+
+// One line that names the thing, and nothing on stdout.
+void ExpectFailure(const RunResult& result, const std::string& part) {
+  EXPECT_EQ(result.exit_code, 1) << result.out << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("saccade: "));
+  EXPECT_THAT(result.err, HasSubstr(part));
+  EXPECT_EQ(result.out, "");
+}
+
+TEST(CommandLineAlone, SaysThatNoServerAnswersAndWhatToDo) {
+  TemporaryFolder folder;
+  // Port 1 is privileged and nobody's.
+  const RunResult result = Saccade({"--server", "127.0.0.1:1", "status"}, folder.path());
+  ExpectFailure(result, "no server answers at 127.0.0.1:1");
+  EXPECT_THAT(result.err, HasSubstr("--server HOST:PORT"));
+}
+
+class CommandLine : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    WriteSmallDataset(*folder_ / "set");
+    server_ =
+        new Server({"--source", "dataset:" + (*folder_ / "set"), "--data-dir", *folder_ / "data"});
+  }
+  static void TearDownTestSuite() {
+    server_->process().Signal(SIGTERM);
+    EXPECT_EQ(server_->process().Wait(seconds(2)), 0) << server_->process().err();
+    delete server_;
+    delete folder_;
+  }
+
+  static RunResult Run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"--server", server_->grpc()});
+    return Saccade(arguments, *folder_ / "state");
+  }
+  static json RunJson(std::vector<std::string> arguments) {
+    arguments.push_back("--json");
+    const RunResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json::parse(result.out, nullptr, /*allow_exceptions=*/false);
+  }
+
+  static TemporaryFolder* folder_;
+  static Server* server_;
+};
+TemporaryFolder* CommandLine::folder_ = nullptr;
+Server* CommandLine::server_ = nullptr;
+
+TEST_F(CommandLine, StatusNamesSourceAndTracking) {
+  const json status = RunJson({"status"});
+  EXPECT_THAT(status["source"].get<std::string>(), HasSubstr("dataset:"));
+  EXPECT_TRUE(status["pose"]["status"].is_string());
+  EXPECT_GT(status["uptime_s"].get<double>(), 0);
+  const RunResult text = Run({"status"});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_THAT(text.out, HasSubstr("tracking"));
+}
+
+TEST_F(CommandLine, RawSnapshotIsTheRecordedPictureToTheBit) {
+  const std::string file = *folder_ / "raw.png";
+  const json taken = RunJson({"snapshot", "--view", "raw", "--out", file});
+  const cv::Mat picture = cv::imread(file, cv::IMREAD_GRAYSCALE);
+  ASSERT_EQ(picture.size(), cv::Size(320, 240));
+  char name[32];
+  std::snprintf(name, sizeof name, "/rgb/%.6f.png", taken["frame_id"].get<int>() / 30.0);
+  const cv::Mat truth = cv::imread(*folder_ / "set" + name, cv::IMREAD_GRAYSCALE);
+  ASSERT_FALSE(truth.empty()) << name;
+  EXPECT_EQ(cv::norm(picture, truth, cv::NORM_INF), 0.0);
+}
+
+TEST_F(CommandLine, AugmentedSnapshotIsAPictureToo) {
+  const std::string file = *folder_ / "augmented.png";
+  RunJson({"snapshot", "--view", "augmented", "--out", file});
+  EXPECT_EQ(cv::imread(file).size(), cv::Size(320, 240));
+}
+
+TEST_F(CommandLine, MapIsWrittenAsPly) {
+  const std::string file = *folder_ / "map.ply";
+  const json answer = RunJson({"map", "--out", file});
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  EXPECT_THAT(text.str(), ::testing::StartsWith("ply\n"));
+  EXPECT_THAT(text.str(), HasSubstr("element vertex " + answer["features"].dump() + "\n"));
+}
+
+TEST_F(CommandLine, WatchDeliversPosesAndEndsInTime) {
+  const RunResult result = Run({"watch", "--for", "1", "--json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream lines(result.out);
+  std::string line;
+  int events = 0;
+  while (std::getline(lines, line)) {
+    EXPECT_TRUE(json::accept(line)) << line;
+    ++events;
+  }
+  EXPECT_GT(events, 0);
+}
+
+TEST_F(CommandLine, AnnotationIsPlacedShownDeletedAndBroughtBack) {
+  const json placed =
+      RunJson({"annotate", "--point", "0.1,-0.05,1.5", "--shape", "note", "--text", "oil"});
+  const std::string id = placed["id"];
+  EXPECT_EQ(placed["shape"], "note");
+  EXPECT_EQ(placed["text"], "oil");
+
+  EXPECT_EQ(RunJson({"annotations", "show", id.substr(0, 8)})["id"], id);
+  const auto listed = [&] {
+    const json all = RunJson({"annotations"});
+    return std::any_of(all.begin(), all.end(), [&](const json& a) { return a["id"] == id; });
+  };
+  EXPECT_TRUE(listed());
+  EXPECT_EQ(RunJson({"annotations", "delete", id})["deleted"], id);
+  EXPECT_FALSE(listed());
+  RunJson({"annotations", "undo"});  // another process, the same session
+  EXPECT_TRUE(listed());
+  RunJson({"annotations", "redo"});
+  EXPECT_FALSE(listed());
+}
+
+TEST_F(CommandLine, BadTargetsAreRefusedByName) {
+  ExpectFailure(Run({"annotate", "--pixel", "5000,10"}), "pixel.u");
+  ExpectFailure(Run({"annotate", "--point", "1e9,0,1"}), "point_in_world_m.x");
+  ExpectFailure(Run({"annotate", "--feature", "18446744073709551615"}), "feature");
+  ExpectFailure(Run({"annotate", "--pixel", "10,10", "--frame", "4000000000"}), "frame");
+  ExpectFailure(Run({"annotate", "--point", "0,0,1", "--text", std::string(501, 'x')}), "text");
+  ExpectFailure(Run({"annotations", "show", "ffffffff"}), "no annotation 'ffffffff'");
+  ExpectFailure(
+      Run({"snapshot", "--view", "raw", "--frame", "4000000000", "--out", *folder_ / "never.png"}),
+      "frame");
+}
+
+TEST_F(CommandLine, FilesThatCannotBeWrittenAreNamed) {
+  ExpectFailure(Run({"snapshot", "--view", "raw", "--out", "/nonexistent/a.png"}),
+                "/nonexistent/a.png");
+  ExpectFailure(Run({"snapshot", "--view", "raw", "--out", "/dev/full"}), "No space left");
+}
+
+TEST_F(CommandLine, GazeSaysThatThereIsNoMount) {
+  ExpectFailure(Run({"fixate", "--point", "0,0,1"}), "no mount");
+  ExpectFailure(Run({"home"}), "no mount");
+}
+
+TEST_F(CommandLine, PortThatIsNotGrpcFailsClearly) {
+  std::string http = server_->http();
+  if (http.starts_with("http://")) http = http.substr(7);
+  if (http.ends_with('/')) http.pop_back();
+  const RunResult result =
+      Saccade({"--server", http, "--timeout", "2", "status"}, *folder_ / "state");
+  ExpectFailure(result, http);
+}
+
+}  // namespace
+}  // namespace saccade::testing

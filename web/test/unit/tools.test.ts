@@ -1,0 +1,175 @@
+import { describe, expect, it } from 'vitest';
+import { Camera } from '../../src/geometry/camera';
+import { IDENTITY } from '../../src/geometry/rigid3';
+import { distance, type Vec3 } from '../../src/geometry/vec3';
+import { makeView, projectPoint } from '../../src/geometry/view';
+import { cubeEdges, markOf, strokesOf } from '../../src/scene/strokes';
+import type { Annotation, Feature } from '../../src/session/types';
+import { landingInMap, landingInVideo, landingWords, ringRadius } from '../../src/tools/landing';
+import { pickNearest } from '../../src/tools/pick';
+import { COMMANDS, controlOf, TOOLS } from '../../src/tools/tools';
+import { anchorWords, presenceWords, statusWords } from '../../src/ui/words';
+
+const camera = new Camera({
+  model: 'pinhole',
+  width: 640,
+  height: 480,
+  fx: 500,
+  fy: 500,
+  cx: 319.5,
+  cy: 239.5,
+  distortion: [],
+});
+const view = makeView(camera, IDENTITY);
+
+const feature = (id: number, pointInWorld: Vec3, depthKnown = true): Feature => ({
+  id,
+  state: 'measured',
+  pointInWorld,
+  covariance: [1e-6, 0, 0, 1e-6, 0, 4e-6],
+  depthKnown,
+  pixel: undefined,
+  matchedCount: 9,
+});
+
+/** A wall at z = 2. */
+const wall = [-0.4, -0.2, 0, 0.2, 0.4].flatMap((x, i) =>
+  [-0.3, 0, 0.3].map((y, k) => feature(10 * i + k, { x, y, z: 2 })),
+);
+
+describe('landing', () => {
+  it('takes a feature within 20 px, with its own uncertainty', () => {
+    const landing = landingInVideo(view, 42, { u: 319.5 + 8, v: 239.5 }, wall);
+    expect(landing?.how).toBe('feature');
+    expect(landing?.pointInWorld).toEqual({ x: 0, y: 0, z: 2 });
+    expect(landing?.sigmaM).toBeCloseTo(0.002, 9);
+    expect(landing?.target).toEqual({ kind: 'pixel', frameId: 42, pixel: { u: 327.5, v: 239.5 } });
+    expect(landing && ringRadius(view, landing)).toBeCloseTo((500 * 0.002) / 2, 6);
+    expect(landing && landingWords(landing)).toBe('±2 mm');
+  });
+
+  it('takes the plane of the features around', () => {
+    const landing = landingInVideo(view, 1, { u: 344.5, v: 275 }, wall);
+    expect(landing?.how).toBe('plane');
+    expect(landing?.pointInWorld.z).toBeCloseTo(2, 9);
+  });
+
+  it('guesses the depth from afar and says so', () => {
+    const landing = landingInVideo(view, 1, { u: 630, v: 20 }, wall);
+    expect(landing?.how).toBe('nearby depth');
+    expect(landing?.sigmaM).toBeCloseTo(0.6, 6);
+    expect(landing && landingWords(landing)).toBe('±60 cm, depth guessed');
+  });
+
+  it('does not pretend to know a depth without a map', () => {
+    const unknown = landingInVideo(view, 1, { u: 100, v: 100 }, [
+      feature(1, { x: 0, y: 0, z: 3 }, false),
+    ]);
+    expect(unknown?.how).toBe('unknown depth');
+    expect(unknown && ringRadius(view, unknown)).toBeUndefined();
+    expect(landingInMap(view, { u: 100, v: 100 }, [])).toBeUndefined();
+  });
+
+  it('in the map names the feature, or the ray', () => {
+    const on = landingInMap(view, { u: 319.5, v: 239.5 }, wall);
+    expect(on?.target.kind).toBe('feature');
+    const beside = landingInMap(view, { u: 344.5, v: 275 }, wall);
+    expect(beside?.target).toMatchObject({ kind: 'ray', originInWorld: { x: 0, y: 0, z: 0 } });
+  });
+});
+
+describe('pickNearest', () => {
+  it('takes the nearest within the radius', () => {
+    const pick = (u: number) =>
+      pickNearest(view, { u, v: 239.5 }, wall, (f) => f.pointInWorld, 10)?.id;
+    expect(pick(321)).toBe(21);
+    expect(pick(345)).toBeUndefined();
+  });
+});
+
+const annotation: Annotation = {
+  id: 'a',
+  shape: 'cube',
+  text: '',
+  author: 'ada',
+  sizeM: 0.05,
+  colorRgba: 0xffffffff,
+  createdMs: 0,
+  inkOffsetsM: [],
+  anchor: {
+    state: 'tracking',
+    pointInWorld: { x: 0, y: 0, z: 1 },
+    covariance: undefined,
+    errorMm: 3.04,
+    errorPx: 0.84,
+    reason: '',
+  },
+};
+const paused: Annotation = {
+  ...annotation,
+  anchor: { ...annotation.anchor, state: 'paused', reason: 'tracking lost' },
+};
+
+describe('strokes', () => {
+  it('draws a cube of 12 edges about its anchor', () => {
+    const edges = cubeEdges({ x: 1, y: 2, z: 3 }, 0.05);
+    expect(edges).toHaveLength(12);
+    for (const [a, b] of edges) expect(distance(a, b)).toBeCloseTo(0.05, 12);
+    const { strokes } = strokesOf(view, [markOf(annotation)]);
+    const points = strokes.flatMap((stroke) => stroke.points);
+    const mean = points.reduce((sum, p) => sum + p.u, 0) / points.length;
+    expect(mean).toBeCloseTo(projectPoint(view, { x: 0, y: 0, z: 1 })?.u ?? NaN, 1);
+  });
+
+  it('draws hollow, and names, what is not to be trusted', () => {
+    const { strokes, labels } = strokesOf(view, [markOf(paused)]);
+    expect(strokes.every((stroke) => stroke.hollow)).toBe(true);
+    expect(labels.map((label) => label.text)).toEqual(['do not trust']);
+  });
+});
+
+describe('words', () => {
+  it('gives an anchor its error, or the reason not to trust it', () => {
+    expect(anchorWords(annotation, true)).toEqual({ text: '0.8 px · 3.0 mm', warn: false });
+    expect(anchorWords(annotation, false).text).toBe('0.8 px · scale unknown');
+    expect(anchorWords(paused, true)).toEqual({ text: 'do not trust: tracking lost', warn: true });
+  });
+
+  it('counts who is here', () => {
+    expect(presenceWords([{ role: 'expert' }, { role: 'wearer' }, { role: 'expert' }])).toBe(
+      '2 experts, 1 wearer',
+    );
+    expect(presenceWords([])).toBe('');
+  });
+
+  it('never says tracking while the link is down', () => {
+    const words = statusWords({
+      link: { kind: 'reconnecting', reason: 'no answer from the server', sinceMs: 1000 },
+      pose: undefined,
+      sourceEnded: false,
+      nowMs: 4200,
+    });
+    expect(words).toMatchObject({
+      text: 'reconnecting, 3 s',
+      advice: 'no answer from the server',
+      warn: true,
+    });
+  });
+});
+
+describe('controls', () => {
+  const press = (key: string, mods = {}) =>
+    controlOf({ key, ctrlKey: false, altKey: false, metaKey: false, shiftKey: false, ...mods });
+
+  it('have one key each', () => {
+    const keys = [...TOOLS, ...COMMANDS].map(({ key }) => key);
+    expect(new Set(keys).size).toBe(keys.length);
+    for (const { key, name } of [...TOOLS, ...COMMANDS]) expect(press(key)).toBe(name);
+  });
+
+  it('leave the browser its own shortcuts', () => {
+    expect(press('r', { ctrlKey: true })).toBeUndefined();
+    expect(press('z', { ctrlKey: true })).toBe('undo');
+    expect(press('Z', { ctrlKey: true, shiftKey: true })).toBe('redo');
+  });
+});
