@@ -21,6 +21,7 @@ void VideoQueue::Push(std::shared_ptr<const VideoPacket> packet) {
 bool VideoQueue::Fits(const VideoPacket& packet) {
   if (packet.key_frame) {
     needs_key_frame_ = false;
+    asked_ns_ = 0;
     reference_kept_ = true;
     return true;
   }
