@@ -51,7 +51,6 @@ TEST(Click, T30MedianErrorBelowOnePercentOfDepthAndConsistent) {
       everywhere.push_back(relative);
       nees_everywhere.push_back(squared);
       provisional += anchor.state == AnchorState::kProvisional ? 1 : 0;
-      static int a=0,b=0,c=0; double e=anchor.error_m/(truth - pose.translation).norm(); if(e<0.1)a++; if(e<0.05)b++; if(e<0.02)c++; if(click==19&&seed==20) std::printf("DBG %d %d %d\n",a,b,c);
       if (rig.map.NeighboursOnSurface(pose, pixel, 80.0) < 3) continue;
       with_neighbours.push_back(relative);
       nees.push_back(squared);

@@ -196,8 +196,8 @@ void SyntheticMap::Improve(FeatureId id, double sigma_m) {
     const Eigen::Vector3d ray = feature.truth.normalized();
     const double across = std::min(sigma_m, 0.002);
     const Eigen::Matrix3d projector = ray * ray.transpose();
-    feature.covariance = sigma_m * sigma_m * projector +
-                         across * across * (Eigen::Matrix3d::Identity() - projector);
+    feature.covariance =
+        sigma_m * sigma_m * projector + across * across * (Eigen::Matrix3d::Identity() - projector);
     const Eigen::Matrix3d root = feature.covariance.llt().matrixL();
     feature.estimate = estimate_from_truth_ * (feature.truth + root * Noise(1.0));
     feature.matched += 10;
