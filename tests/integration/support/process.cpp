@@ -120,6 +120,16 @@ std::optional<std::string> Process::WaitForLine(const std::string& text,
   }
 }
 
+void Process::WaitForEnd(std::chrono::milliseconds limit) {
+  for (const auto end = Clock::now() + limit; Clock::now() < end;) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (out_.ended && err_.ended) return;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
 std::string Process::out() const {
   const std::lock_guard lock(mutex_);
   return out_.text;
@@ -134,12 +144,7 @@ RunResult RunProgram(const std::vector<std::string>& argv, std::chrono::millisec
   Process process(argv, extra_environment);
   const std::optional<int> code = process.Wait(limit);
   if (!code) process.Signal(SIGKILL);
-  // What it wrote last is still in the pipe; the stream ends with the process.
-  for (int i = 0; i < 200; ++i) {
-    const std::string before = process.out() + process.err();
-    std::this_thread::sleep_for(std::chrono::milliseconds(i == 0 ? 2 : 5));
-    if (before == process.out() + process.err()) break;
-  }
+  process.WaitForEnd(std::chrono::seconds(2));
   return {code.value_or(-1), process.out(), process.err()};
 }
 

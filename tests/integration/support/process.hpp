@@ -29,6 +29,9 @@ class Process {
   /// First line of stdout that contains `text`; nothing if it ended or `limit` passed before.
   std::optional<std::string> WaitForLine(const std::string& text, std::chrono::milliseconds limit);
 
+  /// Until both streams are read to their end; they end with the process and its children.
+  void WaitForEnd(std::chrono::milliseconds limit);
+
   std::string out() const;
   std::string err() const;
 
