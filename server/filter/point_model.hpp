@@ -18,8 +18,9 @@ enum class PointForm {
 struct AnchoredPoint {
   Rigid3 world_from_anchor;
   Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // unit, in the anchor
-  Eigen::Matrix<double, 3, 2> basis;                   // tangent of the bearing: b [+] d
-  double inverse_range = 1.0;  // [1/m]; may be slightly below 0 while uncertain
+  Eigen::Matrix<double, 3, 2> basis =
+      Eigen::Matrix<double, 3, 2>::Zero();  // tangent of the bearing: b [+] d
+  double inverse_range = 1.0;               // [1/m]; may be slightly below 0 while uncertain
 };
 
 /// Some orthonormal basis of the plane normal to the unit vector `bearing`.

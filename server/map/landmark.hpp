@@ -61,10 +61,10 @@ class LandmarkMap {
 
 /// When features leave the map (slam-spec 5.6, findings).
 struct RetirementOptions {
-  std::uint32_t min_attempts = 10;      // before a young one is judged
-  double min_success = 0.5;             // of a young one's attempts
-  std::uint32_t mature_after = 40;      // matches; old landmarks are the treasure
-  std::uint32_t mature_failures = 60;   // in a row that a mature one may have
+  std::uint32_t min_attempts = 10;     // before a young one is judged
+  double min_success = 0.5;            // of a young one's attempts
+  std::uint32_t mature_after = 40;     // matches; old landmarks are the treasure
+  std::uint32_t mature_failures = 60;  // in a row that a mature one may have
 };
 
 /// Ids of landmarks that fail too often. Known and seeded ones stay (seeded: twice as long).

@@ -54,9 +54,9 @@ void StatusMonitor::Record(int attempted, int accepted, bool settled) {
   window_.push_back({attempted, accepted});
   if (window_.size() > kWindow) window_.pop_front();
   const double share = ratio();
-  quality_ = share > kGood   ? TrackingQuality::kGood
+  quality_ = share > kGood  ? TrackingQuality::kGood
              : share < kBad ? TrackingQuality::kBad
-                             : TrackingQuality::kPoor;
+                            : TrackingQuality::kPoor;
   bad_in_row_ = quality_ == TrackingQuality::kBad ? bad_in_row_ + 1 : 0;
   blind_in_row_ = accepted == 0 ? blind_in_row_ + 1 : 0;
   if (bad_in_row_ >= options_.lost_after_bad || blind_in_row_ >= options_.lost_after_blind) {

@@ -1,0 +1,71 @@
+// The part of the tracker that tells others what it knows.
+#include "server/tracker/tracker_impl.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr double kDepthKnown = 0.1;  // sigma / depth
+
+/// Covariance of a fixed point in the camera frame: only the pose is uncertain.
+Eigen::Matrix3d KnownInCamera(const FilterState& filter, const Eigen::Vector3d& point) {
+  const Rigid3 camera_from_world = filter.camera().world_from_camera.Inverse();
+  Eigen::Matrix<double, 3, 6> by_pose;
+  by_pose.leftCols<3>() = -camera_from_world.RotationMatrix();
+  by_pose.rightCols<3>() = Skew(camera_from_world * point);
+  return by_pose * filter.PoseCovariance() * by_pose.transpose();
+}
+
+}  // namespace
+
+std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
+                                                          const StageTimes& times) const {
+  auto snapshot = std::make_shared<MapSnapshot>();
+  snapshot->frame_id = frame.id;
+  snapshot->capture_time_ns = frame.capture_time_ns;
+  snapshot->status = monitor_.status();
+  snapshot->quality = monitor_.quality();
+  const CameraMotion& camera = filter_.camera();
+  snapshot->advice = AdviceFor(monitor_, !started_ && starter_.waits_for_target(),
+                               camera.angular_velocity_rad_s.norm(), matches_.accepted);
+  snapshot->metric = metric_;
+  snapshot->world_from_camera = camera.world_from_camera;
+  snapshot->pose_covariance = filter_.PoseCovariance();
+  snapshot->velocity_in_world = camera.velocity_m_s;
+  snapshot->angular_velocity_in_camera = camera.angular_velocity_rad_s;
+  snapshot->attempted = matches_.attempted;
+  snapshot->matched = matches_.accepted;
+  snapshot->map_revision = revision_;
+  snapshot->map_generation = generation_;
+  snapshot->stage_ms = times;
+  snapshot->features.reserve(map_.all().size());
+  auto match = matches_.in_view.begin();  // both lists have rising ids
+  const Eigen::Matrix3d turn = camera.world_from_camera.RotationMatrix();
+  for (const Landmark& landmark : map_.all()) {
+    FeatureSnapshot& feature = snapshot->features.emplace_back();
+    feature.id = landmark.id;
+    feature.matched_count = landmark.matched;
+    if (landmark.known) {
+      feature.point_in_world = landmark.known->point_in_world;
+      feature.covariance_in_camera = KnownInCamera(filter_, feature.point_in_world);
+      feature.depth_known = true;
+    } else {
+      const FeatureMarginal marginal = filter_.Marginal(landmark.id);
+      feature.point_in_world = marginal.point_in_world;
+      feature.covariance_in_world = marginal.covariance_in_world;
+      feature.covariance_in_camera = marginal.covariance_in_camera;
+      const double depth =
+          turn.col(2).dot(marginal.point_in_world - camera.world_from_camera.translation);
+      feature.depth_known = depth > 0 && feature.covariance_in_camera(2, 2) <
+                                             kDepthKnown * kDepthKnown * depth * depth;
+    }
+    while (match != matches_.in_view.end() && match->id < landmark.id) ++match;
+    if (match == matches_.in_view.end() || match->id != landmark.id) continue;
+    feature.pixel = match->pixel;
+    if (match->searched) {
+      feature.state = match->accepted() ? FeatureState::kMeasured : FeatureState::kFailed;
+    }
+  }
+  return snapshot;
+}
+
+}  // namespace saccade

@@ -1,0 +1,143 @@
+// The part of the tracker that finds its way back: keyframes, relocalisation, seeded features.
+#include "server/tracker/recovery.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+
+namespace saccade {
+namespace {
+
+constexpr int kQueryEvery = 2;               // lost frames: a query costs tens of ms
+constexpr double kKeyframeAngle_rad = 0.26;  // 15 deg
+constexpr double kKeyframeShare = 0.2;       // of the distance to what is in view
+constexpr std::uint32_t kMatured = 8;        // matches before a feature is worth recognising
+// What is known of a camera found again, before the features seen from it are used (slam-spec 6).
+constexpr double kPositionShare = 0.3;  // of the distance to what is in view
+constexpr double kAngleSigma_rad = 0.26;
+constexpr double kVelocityShare_1_s = 0.5;
+constexpr double kAngularVelocitySigma_rad_s = 1.0;
+constexpr double kFoundSigma_px = 1.5;
+
+}  // namespace
+
+void Tracker::Impl::KeepKeyframe(const Frame& frame) {
+  if (monitor_.status() != TrackingStatus::kTracking) return;
+  const Rigid3& pose = filter_.camera().world_from_camera;
+  const double distance = kKeyframeShare / std::max(1e-6, depth_.inverse_range);
+  if (!relocaliser_.NeedsKeyframe(pose, distance, kKeyframeAngle_rad)) return;
+  std::vector<KeyframePoint> points;
+  for (const LandmarkMatch& match : matches_.in_view) {
+    if (!match.accepted()) continue;
+    const Landmark* landmark = map_.Find(match.id);
+    if (landmark == nullptr || landmark->matched < kMatured) continue;
+    if (landmark->known) {
+      points.push_back({match.id, match.pixel, landmark->known->point_in_world});
+    } else if (filter_.Has(match.id)) {
+      const FeatureMarginal marginal = filter_.Marginal(match.id);
+      if (marginal.inverse_range_sigma > 0.2 * marginal.inverse_range) continue;
+      points.push_back({match.id, match.pixel, marginal.point_in_world});
+    }
+  }
+  // Too few points is no error: a later frame from here may have more.
+  relocaliser_.AddKeyframe(frame.id, frame.grey, pose, points).IgnoreError();
+}
+
+void Tracker::Impl::Recover(const Frame& frame) {
+  matches_ = FrameMatches();
+  if (frames_lost_++ % kQueryEvery != 0) return;
+  const auto lookup = [this](FeatureId id) -> std::optional<Eigen::Vector3d> {
+    const Landmark* landmark = map_.Find(id);
+    if (landmark == nullptr) return std::nullopt;
+    if (landmark->known) return landmark->known->point_in_world;
+    if (!filter_.Has(id)) return std::nullopt;
+    return filter_.Marginal(id).point_in_world;
+  };
+  const auto found = relocaliser_.Query(frame.grey, *frame.camera, lookup);
+  if (!found) return;
+  before_relocalisation_ = std::make_shared<Backup>(Backup{filter_});
+  if (!Accept(*found, *frame.camera)) {
+    Revert();
+    return;
+  }
+  ++revision_;
+  frames_lost_ = 0;
+  monitor_.BeginRelocalisation();
+}
+
+bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camera) {
+  const double unit = 1.0 / std::max(1e-6, depth_.inverse_range);
+  Vector12d sigma;
+  sigma << Eigen::Vector3d::Constant(kPositionShare * unit),
+      Eigen::Vector3d::Constant(kAngleSigma_rad),
+      Eigen::Vector3d::Constant(kVelocityShare_1_s * unit),
+      Eigen::Vector3d::Constant(kAngularVelocitySigma_rad_s);
+  CameraMotion motion;
+  motion.world_from_camera = found.world_from_camera;
+  filter_.ResetCamera(motion, sigma.cwiseAbs2().asDiagonal());
+  std::vector<Observation> observations;
+  for (const Correspondence& inlier : found.inliers) {
+    const Landmark* landmark = map_.Find(inlier.id);
+    if (landmark == nullptr) continue;
+    Observation observation;
+    observation.id = inlier.id;
+    if (landmark->known) observation.known_point = landmark->known->point_in_world;
+    observation.pixel = inlier.pixel;
+    observation.noise = kFoundSigma_px * kFoundSigma_px * Eigen::Matrix2d::Identity();
+    observations.push_back(observation);
+  }
+  return filter_.Update(camera, observations, found.world_from_camera).ok();
+}
+
+void Tracker::Impl::Revert() {
+  if (before_relocalisation_ == nullptr) return;
+  filter_ = before_relocalisation_->filter;
+  before_relocalisation_.reset();
+}
+
+absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
+                                                     const Rigid3& world_from_camera,
+                                                     const Eigen::Vector2d& pixel,
+                                                     double depth_prior_m, double depth_sigma_m) {
+  if (!started_ || monitor_.status() != TrackingStatus::kTracking) {
+    return absl::FailedPreconditionError("feature: the tracker is not tracking now");
+  }
+  if (!(depth_prior_m > 0.0) || !(depth_sigma_m > 0.0) || !std::isfinite(depth_prior_m) ||
+      !std::isfinite(depth_sigma_m)) {
+    return absl::InvalidArgumentError("feature: depth and its sigma must be above 0");
+  }
+  const auto patch = CutPatch(clicked_frame.grey, pixel, clicked_frame.camera);
+  if (!patch.ok()) return patch.status();
+  const CameraModel& camera = *last_frame_.camera;
+  const Rigid3& pose = filter_.camera().world_from_camera;
+  const double range = depth_prior_m / std::max(0.1, patch->birth_bearing.z());
+  AnchoredPoint clicked{world_from_camera, patch->birth_bearing, TangentBasis(patch->birth_bearing),
+                        1.0 / range};
+  const auto expected = PredictAnchored(camera, pose, clicked);
+  if (!expected || !camera.InImage(expected->pixel, 12.0)) {
+    return absl::NotFoundError("feature: what was clicked is not in view any more");
+  }
+  WarpedPatch look;
+  if (WarpPatch(*patch, pose.Inverse() * world_from_camera, clicked.bearing, clicked.inverse_range,
+                Eigen::Vector3d::Zero(), camera, expected->pixel, WarpOptions(),
+                look) != WarpStatus::kOk) {
+    return absl::NotFoundError("feature: nothing to recognise at this pixel");
+  }
+  const double inverse_sigma = depth_sigma_m / depth_prior_m / range;
+  const Eigen::Vector2d along = expected->d_point.col(2) * inverse_sigma;
+  const Eigen::Matrix2d spread = along * along.transpose() + 4.0 * Eigen::Matrix2d::Identity();
+  SearchOptions search;
+  search.max_sigma_px = 40.0;
+  const SearchResult seen = PatchSearcher(search).Find(pyramid_, look, expected->pixel, spread);
+  if (!seen.found()) return absl::NotFoundError("feature: not seen in the newest frame");
+  const double now = (pose.Inverse() * (world_from_camera * (clicked.bearing * range))).norm();
+  const MapKeeper::DepthGuess depth{1.0 / now, depth_sigma_m / depth_prior_m / now};
+  const AnchorPoseId anchor = filter_.AddAnchor();
+  const auto id = keeper_.Plant(last_frame_, seen.pixel, depth, anchor, matcher_, filter_, map_);
+  filter_.Remove({});
+  if (!id) return absl::NotFoundError("feature: no texture to track at this pixel");
+  map_.Find(*id)->seeded = true;
+  return *id;
+}
+
+}  // namespace saccade

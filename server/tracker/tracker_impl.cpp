@@ -1,0 +1,207 @@
+#include "server/tracker/tracker_impl.hpp"
+
+#include <chrono>
+
+#include "server/tracker/recovery.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr int kSettledFeatures = 12;    // with known depth, before poses are published
+constexpr int kLongestSettling = 15;    // frames: under pure rotation depth never settles
+constexpr double kSettledDepth = 0.25;  // sigma / inverse range
+constexpr int kFewestToUpdate = 3;      // matches: fewer can agree by chance
+constexpr double kSurprise = 3.0;       // times the motion noise, after an unexpected move
+
+class StopWatch {
+ public:
+  double Lap_ms() {
+    const auto now = std::chrono::steady_clock::now();
+    const double lap = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return lap;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+FilterOptions MakeFilterOptions(const TrackerOptions& options) {
+  FilterOptions filter;
+  filter.fej = options.fej;
+  filter.form = options.range_only ? PointForm::kRangeOnly : PointForm::kBearingRange;
+  return filter;
+}
+
+RelocaliserOptions MakeRelocaliserOptions(const TrackerOptions& options) {
+  RelocaliserOptions relocaliser;
+  relocaliser.seed = options.seed;
+  return relocaliser;
+}
+
+}  // namespace
+
+Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
+    : source_(source),
+      options_(options),
+      random_(options.seed),
+      filter_(MakeFilterOptions(options)),
+      matcher_(options),
+      keeper_(options),
+      starter_(source, options),
+      monitor_(options),
+      relocaliser_(MakeRelocaliserOptions(options)) {}
+
+void Tracker::Impl::Reset() {
+  filter_.Reset(CameraMotion(), Matrix12d::Zero());
+  map_.Clear();
+  keeper_.Reset();
+  starter_.Reset();
+  monitor_.Reset();
+  relocaliser_.Clear();
+  matches_ = FrameMatches();
+  before_relocalisation_.reset();
+  started_ = metric_ = has_frame_ = false;
+  frames_ = frames_lost_ = 0;
+  ++generation_;
+  ++revision_;
+}
+
+std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
+  StopWatch total;
+  times_ = StageTimes();
+  const bool usable = frame.camera != nullptr && frame.grey.cols == source_.camera->width() &&
+                      frame.grey.rows == source_.camera->height();
+  const double dt = has_frame_ ? Seconds(frame.capture_time_ns - last_frame_.capture_time_ns) : 0.0;
+  if (!usable || (has_frame_ && dt <= 0.0) || !pyramid_.Build(frame.grey).ok()) {
+    return Publish(frame, times_);
+  }
+  last_frame_ = frame;
+  has_frame_ = true;
+  if (!started_) {
+    Begin(frame);
+  } else if (monitor_.status() == TrackingStatus::kLost) {
+    Recover(frame);
+  } else {
+    Follow(frame, dt);
+  }
+  times_.total_ms = total.Lap_ms();
+  return Publish(frame, times_);
+}
+
+void Tracker::Impl::Begin(const Frame& frame) {
+  StopWatch watch;
+  matches_ = FrameMatches();
+  const auto start = starter_.Try(frame, pyramid_, filter_, map_);
+  times_.search_ms = watch.Lap_ms();
+  if (!start) {
+    monitor_.WaitForStart();
+    return;
+  }
+  metric_ = start->metric;
+  depth_ = start->depth;
+  matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_, random_);
+  keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/true, matcher_, filter_, map_,
+               random_);
+  started_ = filter_.feature_count() > 0 || !map_.all().empty();
+  times_.manage_ms = watch.Lap_ms();
+  if (!started_) return;  // nothing to see at all: try again with the next frame
+  frames_ = 0;
+  if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
+}
+
+bool Tracker::Impl::Settled() const {
+  if (metric_ || frames_ >= kLongestSettling ||
+      monitor_.status() != TrackingStatus::kInitialising) {
+    return true;
+  }
+  int known = 0;
+  for (const LandmarkMatch& match : matches_.in_view) {
+    if (!match.accepted() || !filter_.Has(match.id)) continue;
+    const FeatureMarginal marginal = filter_.Marginal(match.id);
+    known += marginal.inverse_range_sigma < kSettledDepth * marginal.inverse_range ? 1 : 0;
+  }
+  return known >= kSettledFeatures;
+}
+
+void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
+  StopWatch watch;
+  const MotionNoise noise{options_.acceleration_sigma_m_s2,
+                          options_.angular_acceleration_sigma_rad_s2};
+  const CameraMotion before = filter_.camera();
+  filter_.Predict(dt, noise);
+  times_.predict_ms = watch.Lap_ms();
+  matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
+  if (matches_.surprised) {
+    const MotionNoise wild{kSurprise * noise.acceleration_m_s2,
+                           kSurprise * noise.angular_acceleration_rad_s2};
+    filter_.Inflate(LineariseMotion(before, before.world_from_camera.rotation, dt, wild).q);
+    matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
+  }
+  times_.search_ms = watch.Lap_ms();
+}
+
+void Tracker::Impl::Correct(const CameraModel& camera) {
+  StopWatch watch;
+  if (matches_.accepted >= kFewestToUpdate) {
+    std::vector<Observation> observations;
+    for (const LandmarkMatch& match : matches_.in_view) {
+      if (!match.accepted()) continue;
+      Observation observation;
+      observation.id = match.id;
+      if (const auto* known = std::get_if<Eigen::Vector3d>(&match.point)) {
+        observation.known_point = *known;
+      }
+      observation.pixel = match.pixel;
+      observation.noise = match.noise / match.weight;  // soft gate
+      observations.push_back(observation);
+    }
+    const auto report = filter_.Update(camera, observations, matches_.pose.world_from_camera);
+    if (!report.ok()) matches_.accepted = 0;
+  }
+  times_.update_ms = watch.Lap_ms();
+}
+
+void Tracker::Impl::Follow(const Frame& frame, double dt) {
+  ++frames_;
+  PredictAndSearch(*frame.camera, dt);
+  Correct(*frame.camera);
+  StopWatch watch;
+  monitor_.Record(matches_.attempted, matches_.accepted, Settled());
+  const bool confirmed = monitor_.status() == TrackingStatus::kTracking ||
+                         monitor_.status() == TrackingStatus::kInitialising;
+  if (monitor_.refused()) {
+    Revert();
+  } else if (confirmed) {
+    before_relocalisation_.reset();
+    Manage(frame);
+  }
+  times_.manage_ms = watch.Lap_ms();
+}
+
+void Tracker::Impl::Manage(const Frame& frame) {
+  // A frame in which hardly anything was found says nothing about single features.
+  const bool telling = matches_.accepted >= 0.3 * matches_.attempted;
+  for (const LandmarkMatch& match : matches_.in_view) {
+    if (!match.searched || (!telling && !match.accepted())) continue;
+    map_.Find(match.id)->Record(match.accepted(), frames_);
+  }
+  if (starter_.TargetExpired(frames_)) {
+    std::vector<FeatureId> expired;
+    for (const Landmark& landmark : map_.all()) {
+      if (landmark.known) expired.push_back(landmark.id);
+    }
+    map_.Remove(expired);
+    std::erase_if(matches_.in_view, [](const LandmarkMatch& match) {
+      return std::holds_alternative<Eigen::Vector3d>(match.point);
+    });
+  }
+  keeper_.Retire(frames_, filter_, map_);
+  if (!telling) return;
+  if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
+  keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
+               random_);
+  KeepKeyframe(frame);
+}
+
+}  // namespace saccade

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+#include <random>
+
+#include "server/map/relocaliser.hpp"
+#include "server/tracker/frame_matcher.hpp"
+#include "server/tracker/map_keeper.hpp"
+#include "server/tracker/starter.hpp"
+#include "server/tracker/status_monitor.hpp"
+#include "server/tracker/tracker.hpp"
+
+namespace saccade {
+
+/// The tracker's parts and the order in which one frame goes through them.
+class Tracker::Impl {
+ public:
+  Impl(const SourceInfo& source, const TrackerOptions& options);
+
+  std::shared_ptr<const MapSnapshot> Track(const Frame& frame);
+  void Reset();
+  absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame, const Rigid3& world_from_camera,
+                                        const Eigen::Vector2d& pixel, double depth_prior_m,
+                                        double depth_sigma_m);
+  const TrackerOptions& options() const { return options_; }
+
+ private:
+  void Begin(const Frame& frame);
+  void Follow(const Frame& frame, double dt);
+  void Recover(const Frame& frame);
+  bool Accept(const Relocalisation& found, const CameraModel& camera);
+  void Revert();
+  /// Predicts and searches; widens what is expected if the camera moved unexpectedly.
+  void PredictAndSearch(const CameraModel& camera, double dt);
+  void Correct(const CameraModel& camera);
+  void Manage(const Frame& frame);
+  void KeepKeyframe(const Frame& frame);
+  bool Settled() const;
+  std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times) const;
+
+  SourceInfo source_;
+  TrackerOptions options_;
+  std::mt19937_64 random_;
+  FilterState filter_;
+  LandmarkMap map_;
+  FrameMatcher matcher_;
+  MapKeeper keeper_;
+  Starter starter_;
+  StatusMonitor monitor_;
+  Relocaliser relocaliser_;
+  ImagePyramid pyramid_;
+
+  Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows
+  bool has_frame_ = false;
+  bool started_ = false;
+  bool metric_ = false;
+  MapKeeper::DepthGuess depth_;
+  std::int64_t frames_ = 0;  // since the start of this map
+  std::int64_t frames_lost_ = 0;
+  std::uint64_t revision_ = 0;
+  std::uint64_t generation_ = 0;
+  FrameMatches matches_;
+  StageTimes times_;
+  struct Backup;
+  std::shared_ptr<Backup> before_relocalisation_;
+};
+
+}  // namespace saccade
