@@ -76,6 +76,26 @@ std::vector<Observation> PointsFilter::Match(const PointsFrame& frame) const {
   return matches;
 }
 
+Rigid3 PointsFilter::LinearisationPose(const std::vector<Observation>& matches) {
+  std::vector<PoseEvidence> evidence;
+  for (const Observation& match : matches) {
+    PoseEvidence each;
+    each.pixel = match.pixel;
+    each.noise = match.noise;
+    if (match.known_point) {
+      each.point = *match.known_point;
+      each.predicted = *filter_.Predicted(world_.camera, *match.known_point);
+    } else {
+      each.point = filter_.Point(match.id);
+      each.predicted = *filter_.Predicted(world_.camera, match.id);
+    }
+    evidence.push_back(each);
+  }
+  const PosePrior prior = {filter_.camera().world_from_camera, filter_.PoseCovariance()};
+  return EstimateRobustPose(world_.camera, prior, evidence, RobustPoseOptions(), random_)
+      .world_from_camera;
+}
+
 double PointsFilter::MedianInverseRange(const PointsFrame& frame) const {
   std::vector<double> all;
   const Eigen::Vector3d& eye = filter_.camera().world_from_camera.translation;
@@ -131,7 +151,7 @@ absl::StatusOr<PointsStep> PointsFilter::Step(std::size_t index) {
   PointsStep step;
   step.matches = static_cast<int>(matches.size());
   if (!matches.empty()) {
-    const auto report = filter_.Update(world_.camera, matches, filter_.camera().world_from_camera);
+    const auto report = filter_.Update(world_.camera, matches, LinearisationPose(matches));
     if (!report.ok()) return report.status();
     step.nis = report->nis;
   }

@@ -2,11 +2,13 @@
 
 #include <absl/status/status.h>
 
+#include <random>
 #include <set>
 #include <vector>
 
 #include "server/eval/points_world.hpp"
 #include "server/filter/filter_state.hpp"
+#include "server/filter/robust_pose.hpp"
 
 namespace saccade {
 
@@ -39,6 +41,8 @@ class PointsFilter {
 
  private:
   std::vector<Observation> Match(const PointsFrame& frame) const;
+  /// Where the tracker would linearise: the robust pose of these matches.
+  Rigid3 LinearisationPose(const std::vector<Observation>& matches);
   absl::Status Birth(const PointsFrame& frame, std::size_t matched);
   bool IsKnown(int point) const;
   double MedianInverseRange(const PointsFrame& frame) const;
@@ -49,6 +53,7 @@ class PointsFilter {
   FilterState filter_;
   std::set<int> mapped_;  // points that were ever born; a removed one does not come back
   FeatureId next_id_ = 1;
+  std::mt19937_64 random_;
   std::vector<FeatureId> id_of_point_;  // 0: none
 };
 
