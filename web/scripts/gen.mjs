@@ -20,7 +20,8 @@ try {
       `-I${proto}`,
       `--plugin=protoc-gen-es=${join(web, 'node_modules', '.bin', 'protoc-gen-es')}`,
       `--es_out=${out}`,
-      '--es_opt=target=ts',
+      // JavaScript with types, so that the browser test can import it as well.
+      '--es_opt=target=js+dts,import_extension=js',
       ...files,
     ],
     { stdio: 'inherit' },

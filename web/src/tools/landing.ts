@@ -1,6 +1,6 @@
 import { largestSigma } from '../geometry/covariance';
 import { fitPlane, intersect } from '../geometry/plane';
-import { add, distance, dot, pixelDistance, type Pixel, scale, type Vec3 } from '../geometry/vec3';
+import { add, dot, pixelDistance, type Pixel, scale, type Vec3 } from '../geometry/vec3';
 import { depthOf, eyeOf, projectPoint, rayOf, type View } from '../geometry/view';
 import type { Feature, Target } from '../session/types';
 
@@ -13,7 +13,8 @@ export interface Landing {
   readonly how: 'feature' | 'plane' | 'nearby depth' | 'unknown depth';
 }
 
-const FEATURE_PX = 20; // as the server's (slam-spec section 9)
+const FEATURE_PX = 20; // as the server's (slam-spec section 9): such a feature gives its depth
+const SNAP_PX = 8; // in the map, a click this near to a feature means the feature itself
 const NEAR_PX = 120;
 const PLANE_RESIDUAL_M = 0.02;
 const GUESSED_DEPTH_M = 1;
@@ -45,16 +46,14 @@ export function landingInMap(
   const seen = seenFrom(view, pixel, features);
   const direction = rayOf(view, pixel);
   const guess = guessAt(view, pixel, seen);
-  if (!guess || !direction || seen.length === 0) return undefined; // nothing mapped there
   const nearest = seen[0];
-  if (guess.how === 'feature' && nearest) {
-    return { ...guess, target: { kind: 'feature', featureId: nearest.feature.id } };
+  if (!guess || !direction || !nearest) return undefined; // nothing mapped there
+  if (nearest.away <= SNAP_PX) {
+    const { id, pointInWorld } = nearest.feature;
+    return { ...guess, pointInWorld, target: { kind: 'feature', featureId: id } };
   }
-  const origin = eyeOf(view);
-  return {
-    ...guess,
-    target: { kind: 'ray', originInWorld: origin, directionInWorld: direction },
-  };
+  const originInWorld = eyeOf(view);
+  return { ...guess, target: { kind: 'ray', originInWorld, directionInWorld: direction } };
 }
 
 /** Features in front of the eye, nearest to the click first. */
@@ -85,8 +84,8 @@ function guessAt(
   if (!direction) return undefined;
   const nearest = seen[0];
   if (nearest && nearest.away <= FEATURE_PX) {
-    const { feature, depthM } = nearest;
-    return { pointInWorld: feature.pointInWorld, sigmaM: sigmaOf(nearest), depthM, how: 'feature' };
+    const pointInWorld = pointAtDepth(view, direction, nearest.depthM);
+    return { pointInWorld, sigmaM: sigmaOf(nearest), depthM: nearest.depthM, how: 'feature' };
   }
   return (
     onPlane(view, direction, seen) ??
@@ -125,10 +124,14 @@ function atDepth(
 ): Omit<Landing, 'target'> | undefined {
   if (seen.length === 0) return undefined;
   const depthM = median(seen.slice(0, 12).map((entry) => entry.depthM));
+  const pointInWorld = pointAtDepth(view, direction, depthM);
+  return { pointInWorld, sigmaM: 0.3 * depthM, depthM, how: 'nearby depth' };
+}
+
+/** The point of a ray that is `depthM` in front of the eye. */
+function pointAtDepth(view: View, direction: Vec3, depthM: number): Vec3 {
   const eye = eyeOf(view);
-  const ahead = add(eye, direction);
-  const point = add(eye, scale(direction, (depthM * distance(ahead, eye)) / depthOf(view, ahead)));
-  return { pointInWorld: point, sigmaM: 0.3 * depthM, depthM, how: 'nearby depth' };
+  return add(eye, scale(direction, depthM / depthOf(view, add(eye, direction))));
 }
 
 /** Radius [px] of the ring that stands for the uncertainty; undefined: unknown. */

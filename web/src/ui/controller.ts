@@ -126,7 +126,12 @@ export class Controller implements ToolActions, AnnotationActions {
       leave: () => this.leave('video'),
       press: (x, y) => {
         const pixel = this.video.pixelAt(x, y);
-        const view = this.video.current()?.view;
+        const current = this.video.current();
+        const view = current?.view;
+        if (current && pixel) {
+          const { dataset } = this.video.element; // for tests: which frame a click meant
+          dataset['pressed'] = `${current.facts.frameId} ${pixel.u} ${pixel.v}`;
+        }
         this.pressed = pixel && {
           landing: this.landing('video', pixel),
           picked: view && this.pick(view, pixel, PICK_PX / this.video.scale),

@@ -93,9 +93,8 @@ export class VideoPane {
     this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), this.state.selectedId);
     const { hover } = this.state;
     if (hover?.pane !== 'video' || !hover.landing) return;
-    const { landing } = hover;
-    const at = landing.how === 'feature' ? projectPoint(view, landing.pointInWorld) : hover.pixel;
-    if (at) this.painter.ring(at, ringRadius(view, landing), landingWords(landing));
+    const { landing, pixel } = hover;
+    this.painter.ring(pixel, ringRadius(view, landing), landingWords(landing));
   }
 
   /**

@@ -41,7 +41,9 @@ describe('landing', () => {
   it('takes a feature within 20 px, with its own uncertainty', () => {
     const landing = landingInVideo(view, 42, { u: 319.5 + 8, v: 239.5 }, wall);
     expect(landing?.how).toBe('feature');
-    expect(landing?.pointInWorld).toEqual({ x: 0, y: 0, z: 2 });
+    // Its depth, on the ray of the click.
+    expect(landing?.pointInWorld.x).toBeCloseTo((2 * 8) / 500, 9);
+    expect(landing?.pointInWorld.z).toBeCloseTo(2, 9);
     expect(landing?.sigmaM).toBeCloseTo(0.002, 9);
     expect(landing?.target).toEqual({ kind: 'pixel', frameId: 42, pixel: { u: 327.5, v: 239.5 } });
     expect(landing && ringRadius(view, landing)).toBeCloseTo((500 * 0.002) / 2, 6);
