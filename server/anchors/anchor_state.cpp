@@ -103,6 +103,7 @@ Anchor DescribeAnchor(const MapView& map, const CameraModel& camera, const Ancho
 Anchor DescribeDetached(const MapSnapshot& snapshot, const AnchorOptions& options,
                         const AnchorPlace& place, Anchor last) {
   last.state = AnchorState::kPaused;
+  last.place_known = false;
   last.error_px.reset();
   last.pixel.reset();
   if (place.world_key.empty() || place.world_key != options.world_key) {

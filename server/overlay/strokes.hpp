@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,54 +13,64 @@
 
 namespace saccade {
 
-/// What a stroke belongs to; the page uses the same names.
-enum class StrokeKind {
-  kCube,
-  kNotePin,
-  kNoteBox,
-  kArrow,
-  kInk,
-  kAxisX,
-  kAxisY,
-  kAxisZ,
-  kEdgeArrow
-};
+using Polyline2 = std::vector<Eigen::Vector2d>;  // [px, distorted]
+using Polyline3 = std::vector<Eigen::Vector3d>;  // in world [m]
 
-/// A polyline in distorted pixels, already cut at the near plane and at the picture's border.
+/// A polyline of one annotation as it appears through the lens.
 struct Stroke {
-  StrokeKind kind = StrokeKind::kCube;
-  std::string annotation_id;  // empty for axes
+  std::string annotation_id;
   std::uint32_t color_rgba = 0xffffffff;
-  bool dashed = false;         // "do not trust": paused
-  bool closed_filled = false;  // note boxes and edge arrows
-  std::vector<Eigen::Vector2d> points_px;
+  bool hollow = false;  // "do not trust": drawn dashed
+  Polyline2 points_px;
 };
 
-/// A text with the left end of its base line.
+/// A text beside a point.
 struct Label {
   std::string annotation_id;
-  std::string text;  // one line, at most 40 characters
-  Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
-  bool do_not_trust = false;
+  std::string text;  // at most 40 characters, and the words "do not trust" where it is hollow
+  std::uint32_t color_rgba = 0xffffffff;
+  bool hollow = false;
+  Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
 };
 
-struct Strokes {
+/// A mark outside the view: where on the picture's edge to point, and whither.
+struct EdgeArrow {
+  std::string annotation_id;
+  std::uint32_t color_rgba = 0xffffffff;
+  bool hollow = false;
+  Eigen::Vector2d tip_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  // unit
+};
+
+struct Marks {
   std::vector<Stroke> strokes;
   std::vector<Label> labels;
+  std::vector<EdgeArrow> edge_arrows;
 };
 
-/// Strokes of the annotations in a view: exact definitions in server/overlay/README.md, which the
-/// page follows too. Points behind the camera, not finite or beyond the lens leave gaps, never NaN.
-Strokes AnnotationStrokes(const CameraModel& camera, const Rigid3& world_from_camera,
-                          const std::vector<Annotation>& annotations);
+/// One world axis, 10 cm long.
+struct AxisStroke {
+  char name = 'x';
+  std::vector<Polyline2> pieces;
+  std::optional<Eigen::Vector2d> end_px;
+};
 
-/// The three world axes, 10 cm long, at the world's origin.
-Strokes WorldAxisStrokes(const CameraModel& camera, const Rigid3& world_from_camera);
+/// Marks of the annotations in a view: exact definitions in server/overlay/README.md, which the
+/// page follows too. Stopped annotations and those whose place is not known have none. Points
+/// behind the camera, not finite or beyond the lens leave gaps, never NaN.
+Marks AnnotationMarks(const CameraModel& camera, const Rigid3& world_from_camera,
+                      const std::vector<Annotation>& annotations);
+
+/// The world's axes at its origin.
+std::array<AxisStroke, 3> WorldAxes(const CameraModel& camera, const Rigid3& world_from_camera);
+
+/// The lines of one annotation's shape in world.
+std::vector<Polyline3> ShapeLines(const Annotation& annotation);
 
 /// A polyline in world as it appears through the lens: cut at the near plane (2 cm), divided until
-/// no piece bends by more than 0.25 px, clipped to the picture with a border of 32 px.
-std::vector<std::vector<Eigen::Vector2d>> ProjectPolyline(
-    const CameraModel& camera, const Rigid3& camera_from_world,
-    const std::vector<Eigen::Vector3d>& points_in_world);
+/// no piece bends by more than 0.25 px (at most 256 pieces), cut where it is more than 32 px
+/// outside the picture.
+std::vector<Polyline2> ProjectPolyline(const CameraModel& camera, const Rigid3& camera_from_world,
+                                       const Polyline3& points_in_world);
 
 }  // namespace saccade

@@ -60,6 +60,8 @@ struct Anchor {
   std::optional<double> error_px;
   std::optional<Eigen::Vector2d> pixel;  // where it is in the newest frame [px, distorted]
   std::string reason;                    // why paused or stopped, in words
+  /// False: the point is of another map and means nothing in this one; nothing is to be drawn.
+  bool place_known = true;
 };
 
 struct Annotation {
