@@ -77,21 +77,26 @@ std::vector<KeyframePoint> MapPoints(const Recording& recording, const CameraMod
 
 class RelocaliserOnDesk : public ::testing::Test {
  protected:
+  static void SetUpTestSuite() {
+    if (!desk_.present()) return;
+    relocaliser_ = std::make_unique<Relocaliser>(RelocaliserOptions{});
+    for (int frame = 20; frame + 31 < desk_.size() && frame < 760; frame += 60) {
+      map_[frame] = MapPoints(desk_, *camera_, frame);
+      const auto status =
+          relocaliser_->AddKeyframe(frame, desk_.Image(frame), desk_.Truth(frame), map_[frame]);
+      if (status.ok()) points_ += static_cast<int>(map_[frame].size());
+    }
+  }
+  static void TearDownTestSuite() { relocaliser_.reset(); }
   void SetUp() override {
     if (!desk_.present()) GTEST_SKIP() << "needs ../shared/data/tum_fr1_xyz";
-    for (int frame = 20; frame + 31 < desk_.size() && frame < 760; frame += 60) {
-      const auto points = MapPoints(desk_, *camera_, frame);
-      const auto status =
-          relocaliser_.AddKeyframe(frame, desk_.Image(frame), desk_.Truth(frame), points);
-      if (status.ok()) points_ += static_cast<int>(points.size());
-    }
-    ASSERT_GE(relocaliser_.size(), 6U);
+    ASSERT_GE(relocaliser_->size(), 6U);
   }
-  Recording desk_{"tum_fr1_xyz"};
-  std::shared_ptr<const CameraModel> camera_ = TumCamera();
-  Relocaliser relocaliser_{RelocaliserOptions{}};
-  int points_ = 0;
-  std::map<int, std::vector<KeyframePoint>> cache_;
+  static inline const Recording desk_{"tum_fr1_xyz"};
+  static inline const std::shared_ptr<const CameraModel> camera_ = TumCamera();
+  static inline std::unique_ptr<Relocaliser> relocaliser_;
+  static inline std::map<int, std::vector<KeyframePoint>> map_;  // by keyframe
+  static inline int points_ = 0;
 };
 
 TEST_F(RelocaliserOnDesk, FindsFramesBetweenTheKeyframes) {
@@ -101,7 +106,7 @@ TEST_F(RelocaliserOnDesk, FindsFramesBetweenTheKeyframes) {
   for (int frame = 5; frame < desk_.size(); frame += 9) {
     const cv::Mat image = desk_.Image(frame);
     const auto start = std::chrono::steady_clock::now();
-    const auto result = relocaliser_.Query(image, *camera_);
+    const auto result = relocaliser_->Query(image, *camera_);
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
     times.push_back(took.count());
     ++asked;
@@ -121,7 +126,7 @@ TEST_F(RelocaliserOnDesk, FindsFramesBetweenTheKeyframes) {
       "relocaliser on fr1/xyz: %zu keyframes, %d points; %d of %d found, %d wrong, mean %.0f "
       "inliers; error median %.1f p95 %.1f mm, %.2f p95 %.2f deg; time median %.1f p95 %.1f "
       "max %.1f ms\n",
-      relocaliser_.size(), points_, found, asked, wrong, inliers / std::max(1, found),
+      relocaliser_->size(), points_, found, asked, wrong, inliers / std::max(1, found),
       1e3 * at(metres, 0.5), 1e3 * at(metres, 0.95), at(degrees, 0.5), at(degrees, 0.95),
       at(times, 0.5), at(times, 0.95), at(times, 1.0));
   EXPECT_GE(found, asked * 0.9);
@@ -139,7 +144,7 @@ TEST_F(RelocaliserOnDesk, AcceptsNothingForeign) {
       cv::Mat image;
       cv::resize(other.Image(frame), image, cv::Size(640, 480));
       ++asked;
-      EXPECT_FALSE(relocaliser_.Query(image, *camera_).has_value()) << name << " " << frame;
+      EXPECT_FALSE(relocaliser_->Query(image, *camera_).has_value()) << name << " " << frame;
     }
   }
   std::printf("relocaliser: %d foreign pictures refused\n", asked);
@@ -150,29 +155,25 @@ TEST_F(RelocaliserOnDesk, UsesThePointsAsTheyAreNow) {
   // The map has moved since: everything 1 m along x. Every third feature was deleted.
   const auto lookup = [&](FeatureId id) -> std::optional<Eigen::Vector3d> {
     if (id % 3 == 0) return std::nullopt;
-    for (int frame = 20; frame < 760; frame += 60) {
-      if (static_cast<int>(id / 1000) != frame) continue;
-      if (!cache_.contains(frame)) cache_[frame] = MapPoints(desk_, *camera_, frame);
-      for (const KeyframePoint& p : cache_[frame]) {
-        if (p.id == id) return p.point_in_world + Eigen::Vector3d::UnitX();
-      }
+    for (const KeyframePoint& p : map_[static_cast<int>(id / 1000)]) {
+      if (p.id == id) return p.point_in_world + Eigen::Vector3d::UnitX();
     }
     return std::nullopt;
   };
-  const auto result = relocaliser_.Query(desk_.Image(322), *camera_, lookup);
+  const auto result = relocaliser_->Query(desk_.Image(322), *camera_, lookup);
   ASSERT_TRUE(result.has_value());
   const Eigen::Vector3d expected = desk_.Truth(322).translation + Eigen::Vector3d::UnitX();
   EXPECT_LT((result->world_from_camera.translation - expected).norm(), 0.06);
   for (const Correspondence& c : result->inliers) EXPECT_NE(c.id % 3, 0U);
   EXPECT_FALSE(
-      relocaliser_.Query(desk_.Image(322), *camera_, [](FeatureId) { return std::nullopt; }));
+      relocaliser_->Query(desk_.Image(322), *camera_, [](FeatureId) { return std::nullopt; }));
 }
 
 TEST_F(RelocaliserOnDesk, StaysWithinItsLimitAndForgetsTheMostAlike) {
   RelocaliserOptions options;
   options.max_keyframes = 3;
   Relocaliser small(options);
-  const auto points = MapPoints(desk_, *camera_, 20);
+  const auto& points = map_[20];
   Rigid3 pose;
   for (int k = 0; k < 6; ++k) {
     pose.translation.x() = k == 5 ? 4.1 : k;  // the last is nearly the one before
