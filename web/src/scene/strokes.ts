@@ -7,6 +7,7 @@ import { type Annotation, doNotTrust, type Shape } from '../session/types';
 export interface Stroke {
   readonly annotationId: string; // empty: the world's axes
   readonly points: readonly Pixel[];
+  readonly colour: string; // CSS
   readonly hollow: boolean; // "do not trust", or not answered yet
 }
 
@@ -14,6 +15,7 @@ export interface Label {
   readonly annotationId: string;
   readonly text: string;
   readonly at: Pixel;
+  readonly colour: string;
   readonly hollow: boolean;
 }
 
@@ -30,18 +32,18 @@ export interface Mark {
   readonly sizeM: number;
   readonly pointInWorld: Vec3;
   readonly inkOffsetsM: readonly Vec3[];
+  readonly colour: string;
   readonly hollow: boolean;
 }
 
-export const markOf = (annotation: Annotation): Mark => ({
-  id: annotation.id,
-  shape: annotation.shape,
-  text: annotation.text,
-  sizeM: annotation.sizeM,
-  pointInWorld: annotation.anchor.pointInWorld,
-  inkOffsetsM: annotation.inkOffsetsM,
-  hollow: doNotTrust(annotation.anchor),
-});
+/** Undefined where the annotation has no place in this map. */
+export function markOf(annotation: Annotation): Mark | undefined {
+  const { anchor, id, shape, text, sizeM, inkOffsetsM, colorRgba } = annotation;
+  if (!anchor.pointInWorld || anchor.state === 'stopped') return undefined;
+  const colour = `#${(colorRgba >>> 8).toString(16).padStart(6, '0')}`;
+  const hollow = doNotTrust(anchor);
+  return { id, shape, text, sizeM, inkOffsetsM, colour, hollow, pointInWorld: anchor.pointInWorld };
+}
 
 const AXIS_M = 0.1;
 
@@ -94,13 +96,15 @@ export function strokesOf(view: View, marks: readonly Mark[]): Marks {
   for (const mark of marks) {
     for (const line of linesOf(mark)) {
       for (const points of projectPolyline(view.camera, view.cameraFromWorld, line)) {
-        strokes.push({ annotationId: mark.id, points, hollow: mark.hollow });
+        strokes.push({ annotationId: mark.id, points, colour: mark.colour, hollow: mark.hollow });
       }
     }
     const at = projectPoint(view, mark.shape === 'note' ? noteTop(mark) : mark.pointInWorld);
     if (!at || !view.camera.inImage(at, -32)) continue;
     const text = labelOf(mark);
-    if (text) labels.push({ annotationId: mark.id, text, at, hollow: mark.hollow });
+    if (text) {
+      labels.push({ annotationId: mark.id, text, at, colour: mark.colour, hollow: mark.hollow });
+    }
   }
   return { strokes, labels };
 }

@@ -176,7 +176,7 @@ export function toAnnotation(pb: PbAnnotation): Annotation {
     inkOffsetsM: pb.inkOffsetM.map(toVec3),
     anchor: {
       state: anchorStates[anchor?.state ?? PbAnchorState.UNSPECIFIED],
-      pointInWorld: toVec3(anchor?.pointInWorldM),
+      pointInWorld: anchor?.pointInWorldM && toVec3(anchor.pointInWorldM),
       covariance: covariance3(anchor?.covarianceInWorldM2?.upper ?? []),
       errorMm: anchor?.errorMm ?? 0,
       errorPx: anchor?.errorPx,

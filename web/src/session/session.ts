@@ -11,7 +11,15 @@ import { ClockOffset, pageNowMs, wireTimes } from './clock';
 import { pbRoles, toIntrinsics, toParticipant, toPose, toStages } from './convert';
 import { MapState } from './map_state';
 import { FrameRing } from './ring';
-import type { FrameFacts, Link, Participant, Pose, Role, Statistics, View } from './types';
+import {
+  type FrameFacts,
+  isPlaced,
+  type Link,
+  type Participant,
+  type Pose,
+  type Role,
+} from './types';
+import type { Statistics, View } from './types';
 
 /** Where coded pictures go. */
 export interface PictureSink {
@@ -234,7 +242,7 @@ export class Session {
   private receivePose(pose: Pose): void {
     if (this.pose && pose.mapRevision !== this.pose.mapRevision) this.path.length = 0;
     this.pose = pose;
-    if (pose.status !== 'tracking' && pose.status !== 'coasting') return;
+    if (!isPlaced(pose)) return;
     this.path.push(pose);
     if (this.path.length > 9000) this.path.splice(0, 3000);
   }

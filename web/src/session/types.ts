@@ -30,6 +30,10 @@ export interface Pose {
   readonly mapRevision: number;
 }
 
+/** True where the pose is an estimate of this frame's own, not the last one before tracking was lost. */
+export const isPlaced = (pose: Pose | undefined): pose is Pose =>
+  pose?.status === 'tracking' || pose?.status === 'coasting';
+
 /** Server's monotonic clock [ms]; 0: stage not run. */
 export interface Stages {
   readonly captured: number;
@@ -61,7 +65,7 @@ export interface Feature {
 
 export interface Anchor {
   readonly state: AnchorState;
-  readonly pointInWorld: Vec3;
+  readonly pointInWorld: Vec3 | undefined; // undefined: its place in this map is not known
   readonly covariance: Covariance3 | undefined;
   readonly errorMm: number;
   readonly errorPx: number | undefined;

@@ -6,13 +6,14 @@ export function pickNearest<T>(
   view: View,
   pixel: Pixel,
   things: Iterable<T>,
-  pointOf: (thing: T) => Vec3,
+  pointOf: (thing: T) => Vec3 | undefined,
   radius: number,
 ): T | undefined {
   let best: T | undefined;
   let bestAway = radius;
   for (const thing of things) {
-    const at = projectPoint(view, pointOf(thing));
+    const point = pointOf(thing);
+    const at = point && projectPoint(view, point);
     const away = at ? pixelDistance(at, pixel) : Infinity;
     if (away <= bestAway) {
       best = thing;

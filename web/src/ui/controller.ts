@@ -2,7 +2,7 @@ import type { Pixel } from '../geometry/vec3';
 import type { View } from '../geometry/view';
 import { EditError, type Edits } from '../session/edits';
 import type { Session } from '../session/session';
-import type { Annotation } from '../session/types';
+import { type Annotation, isPlaced } from '../session/types';
 import { type Landing, landingInMap, landingInVideo } from '../tools/landing';
 import { pickNearest } from '../tools/pick';
 import { type CommandName, shapeOf, type ToolName } from '../tools/tools';
@@ -211,8 +211,8 @@ export class Controller implements ToolActions, AnnotationActions {
   }
 
   private whyNoLanding(pane: PaneName): string {
-    if (this.session.pose === undefined || this.session.pose.status === 'initialising') {
-      return 'Not placed: the camera’s place is not known yet.';
+    if (!isPlaced(this.session.pose)) {
+      return 'Not placed: where the camera is is not known now.';
     }
     return pane === 'map'
       ? 'Not placed: nothing is mapped there.'

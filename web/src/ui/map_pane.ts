@@ -3,6 +3,7 @@ import { projectPoint, type View } from '../geometry/view';
 import type { MapView } from '../scene/map_view';
 import { axisStrokes, strokesOf } from '../scene/strokes';
 import type { Session } from '../session/session';
+import { isPlaced } from '../session/types';
 import { landingWords, ringRadius } from '../tools/landing';
 import type { AppState } from './app_state';
 import { h, setText } from './dom';
@@ -65,10 +66,9 @@ export class MapPane {
     map.pictureIntervalMs = screenFps > 0 && screenFps < 45 ? 150 : 0;
     const shown = this.player.shown?.facts;
     const pose = shown?.pose;
-    const placed = shown && pose && pose.status !== 'initialising' && pose.status !== 'unknown';
     const moved = map.draw(
       nowMs,
-      placed
+      shown && isPlaced(pose)
         ? { frameId: shown.frameId, camera: shown.camera, worldFromCamera: pose.worldFromCamera }
         : undefined,
     );

@@ -5,8 +5,8 @@ import type { AnnotationBook } from '../session/annotation_book';
 export function allMarks(book: AnnotationBook): Mark[] {
   const marks = book
     .list()
-    .filter(({ anchor }) => anchor.state !== 'stopped')
-    .map(markOf);
+    .map(markOf)
+    .filter((mark) => mark !== undefined);
   for (const pending of book.pendingList()) {
     if (!pending.pointInWorld) continue;
     marks.push({
@@ -16,6 +16,7 @@ export function allMarks(book: AnnotationBook): Mark[] {
       sizeM: pending.sizeM,
       pointInWorld: pending.pointInWorld,
       inkOffsetsM: [],
+      colour: '#ffffff',
       hollow: true,
     });
   }

@@ -84,19 +84,19 @@ export class Painter {
       this.trace(points);
       this.stroke(HALO, 5);
     }
-    for (const { points, hollow, annotationId } of strokes) {
+    for (const { points, hollow, annotationId, colour } of strokes) {
       if (hollow) this.context.setLineDash([5 * this.ratio, 5 * this.ratio]);
       this.trace(points);
-      this.stroke(chosen(annotationId) ? ACCENT : LINE, 2);
+      this.stroke(chosen(annotationId) ? ACCENT : colour, 2);
       this.context.setLineDash([]);
     }
-    for (const { text, at, hollow, annotationId } of labels) {
-      this.label(text, at, chosen(annotationId), hollow);
+    for (const { text, at, hollow, annotationId, colour } of labels) {
+      this.label(text, at, chosen(annotationId) ? ACCENT : colour, hollow);
     }
   }
 
   /** A filled box with text, its lower left corner beside a point. */
-  private label(text: string, at: Pixel, chosen: boolean, hollow: boolean): void {
+  private label(text: string, at: Pixel, colour: string, hollow: boolean): void {
     const { context, ratio } = this;
     context.font = FONT.replace('13', String(13 * ratio));
     const width = context.measureText(text).width + 12 * ratio;
@@ -104,7 +104,7 @@ export class Painter {
     const x = this.x(at) + 6 * ratio;
     const y = this.y(at) - height - 4 * ratio;
     context.fillStyle = 'rgba(16, 17, 18, 0.86)';
-    context.strokeStyle = chosen ? ACCENT : LINE;
+    context.strokeStyle = colour;
     context.lineWidth = 1.5 * ratio;
     if (hollow) context.setLineDash([4 * ratio, 4 * ratio]);
     context.beginPath();
@@ -112,7 +112,7 @@ export class Painter {
     context.fill();
     context.stroke();
     context.setLineDash([]);
-    context.fillStyle = chosen ? ACCENT : LINE;
+    context.fillStyle = colour;
     context.textBaseline = 'middle';
     context.fillText(text, x + 6 * ratio, y + height / 2 + ratio / 2);
   }

@@ -3,7 +3,7 @@ import { makeView, projectPoint, type View } from '../geometry/view';
 import { axisStrokes, strokesOf } from '../scene/strokes';
 import type { Session } from '../session/session';
 import { pageNowMs } from '../session/clock';
-import type { FrameFacts } from '../session/types';
+import { type FrameFacts, isPlaced } from '../session/types';
 import { landingWords, ringRadius } from '../tools/landing';
 import type { AppState } from './app_state';
 import { h, setText } from './dom';
@@ -39,8 +39,7 @@ export class VideoPane {
     const facts = this.player.shown?.facts;
     if (!facts) return undefined;
     const { pose, camera } = facts;
-    const placed = pose && pose.status !== 'initialising' && pose.status !== 'unknown';
-    return { facts, view: placed ? makeView(camera, pose.worldFromCamera) : undefined };
+    return { facts, view: isPlaced(pose) ? makeView(camera, pose.worldFromCamera) : undefined };
   }
 
   /** Picture pixel under a pointer; undefined outside the picture. */
@@ -87,8 +86,8 @@ export class VideoPane {
   }
 
   private drawFrame(facts: FrameFacts, view: View | undefined): void {
-    this.drawFeatures(facts, view);
     if (!view) return;
+    this.drawFeatures(facts, view);
     this.painter.axes(axisStrokes(view));
     this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), this.state.selectedId);
     const { hover } = this.state;
@@ -101,12 +100,12 @@ export class VideoPane {
    * Where exactly this frame saw them. Without a report for this very frame, their places are
    * projected with this frame's own pose, with the newest state known at that time.
    */
-  private drawFeatures(facts: FrameFacts, view: View | undefined): void {
+  private drawFeatures(facts: FrameFacts, view: View): void {
     const { map } = this.session;
     const exact = map.seenIn(facts.frameId);
     for (const { id, state, pixel } of exact ?? map.seenUpTo(facts.frameId) ?? []) {
       const feature = map.features.get(id);
-      const at = exact ? pixel : feature && view && projectPoint(view, feature.pointInWorld);
+      const at = exact ? pixel : feature && projectPoint(view, feature.pointInWorld);
       if (at && facts.camera.inImage(at)) this.painter.feature(at, state);
     }
   }

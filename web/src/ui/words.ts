@@ -105,6 +105,7 @@ export function anchorWords(
   if (anchor.state === 'stopped') {
     return { text: `stopped${anchor.reason ? `: ${anchor.reason}` : ''}`, warn: true };
   }
+  if (!anchor.pointInWorld) return { text: 'place not known', warn: true };
   const px = anchor.errorPx === undefined ? 'out of view' : `${anchor.errorPx.toFixed(1)} px`;
   const size = metric ? ` · ${millimetres(anchor.errorMm)}` : ' · scale unknown';
   const provisional = anchor.state === 'provisional' ? ' · provisional' : '';

@@ -117,14 +117,14 @@ describe('strokes', () => {
     const edges = cubeEdges({ x: 1, y: 2, z: 3 }, 0.05);
     expect(edges).toHaveLength(12);
     for (const [a, b] of edges) expect(distance(a, b)).toBeCloseTo(0.05, 12);
-    const { strokes } = strokesOf(view, [markOf(annotation)]);
+    const { strokes } = strokesOf(view, [markOf(annotation)!]);
     const points = strokes.flatMap((stroke) => stroke.points);
     const mean = points.reduce((sum, p) => sum + p.u, 0) / points.length;
     expect(mean).toBeCloseTo(projectPoint(view, { x: 0, y: 0, z: 1 })?.u ?? NaN, 1);
   });
 
   it('draws hollow, and names, what is not to be trusted', () => {
-    const { strokes, labels } = strokesOf(view, [markOf(paused)]);
+    const { strokes, labels } = strokesOf(view, [markOf(paused)!]);
     expect(strokes.every((stroke) => stroke.hollow)).toBe(true);
     expect(labels.map((label) => label.text)).toEqual(['do not trust']);
   });
