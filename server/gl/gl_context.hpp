@@ -29,8 +29,8 @@ class GlContext {
 
   /// Binds the context to the calling thread.
   virtual absl::Status MakeCurrent() = 0;
-  /// Address of an OpenGL function by its full name ("glClear"), null where there is none. Pass it
-  /// to GlFunctions::Load.
+  /// Address of an OpenGL function by its full name ("glClear"); for a name that it does not know,
+  /// null or (Mesa) a stub that does nothing. Pass it to GlFunctions::Load.
   virtual Procedure GetProcAddress(const char* name) const = 0;
 
   /// Makes a context and binds it to the calling thread.

@@ -267,8 +267,8 @@ cv::Mat PaintMug(std::uint64_t seed) {
   for (int side = 0; side < 2; ++side) {
     const cv::Point c(160 + 320 * side, 122);
     cv::circle(image, c, 74, ink, 6, cv::LINE_AA);
-    Text(image, side ? "TEA" : "LAB 3", c + cv::Point(0, -14), 34, ink, 4);
-    Text(image, side ? "always" : "COFFEE", c + cv::Point(0, 30), 20, Rgb(190, 60, 40), 3);
+    Text(image, side ? "TEA" : "LAB 3", c + cv::Point(0, -14), 26, ink, 3);
+    Text(image, side ? "always" : "COFFEE", c + cv::Point(0, 28), 16, Rgb(190, 60, 40), 2);
   }
   Grain(image, rng, 2.0, 1);
   return image;

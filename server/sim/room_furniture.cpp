@@ -132,7 +132,7 @@ void Sideboard(RoomBuilder& room, const RoomMaterials& m) {
 void Plant(RoomBuilder& room, const RoomMaterials& m) {
   cv::RNG rng = RngFor(m.seed, "plant");
   const Paint leaf = RoomMaterials::Whole(room.AddTexture(PaintLeaf(m.seed), false));
-  room.Push({3.62f, 0, 0.40f});
+  room.Push({3.58f, 0, 0.44f});
   room.SetLightSpacing(0.05f);
   room.Tube(m.Plain(kTerracotta), {0, 0, 0}, 0.12f, 0.17f, 0.30f, 20);
   room.Tube(m.Plain(kTerracotta), {0, 0.28f, 0}, 0.18f, 0.18f, 0.04f, 20);
@@ -141,7 +141,7 @@ void Plant(RoomBuilder& room, const RoomMaterials& m) {
   for (int k = 0; k < 15; ++k) {
     room.Push({0, 0.31f, 0}, 2.39996f * static_cast<float>(k), 0);
     const float length = static_cast<float>(rng.uniform(0.35, 0.75));
-    const float lean = static_cast<float>(rng.uniform(0.25, 1.0));
+    const float lean = static_cast<float>(rng.uniform(0.20, 0.48));
     const float width = 0.11f * length + 0.03f;
     // A blade that rises and bends over; drawn from both sides.
     const auto blade = [=](float s, float t) {
