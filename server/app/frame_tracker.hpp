@@ -25,17 +25,4 @@ class FrameTracker {
                                                 double depth_sigma_m) = 0;
 };
 
-/// Video without tracking: every frame is INITIALISING, and says so.
-class NoTracker final : public FrameTracker {
- public:
-  std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override;
-  void Reset() override { ++generation_; }
-  absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame, const Rigid3& world_from_camera,
-                                        const Eigen::Vector2d& pixel, double depth_prior_m,
-                                        double depth_sigma_m) override;
-
- private:
-  std::uint64_t generation_ = 0;
-};
-
 }  // namespace saccade

@@ -9,6 +9,7 @@
 #include "server/app/engine.hpp"
 #include "server/app/open_source.hpp"
 #include "server/app/server_config.hpp"
+#include "server/app/slam_tracker.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
@@ -52,13 +53,22 @@ std::filesystem::path WebRoot(const ServerConfig& config) {
 absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, StreamHub& hub) {
   absl::StatusOr<std::unique_ptr<FrameSource>> source = OpenConfiguredSource(config);
   if (!source.ok()) return source.status();
+  TrackerOptions tracker_options;
+  tracker_options.seed = config.seed;
+  if (!config.config_file.empty()) {
+    const absl::Status loaded = tracker_options.LoadToml(config.config_file);
+    if (!loaded.ok()) return loaded;
+  }
+  absl::StatusOr<std::unique_ptr<FrameTracker>> tracker =
+      MakeSlamTracker((*source)->info(), tracker_options);
+  if (!tracker.ok()) return tracker.status();
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);
   if (!store.ok()) return store.status();
   EngineOptions options;
   options.version = kVersion;
   options.every_frame = config.every_frame;
   options.video_bit_rate_bit_s = config.video_bit_rate_bit_s;
-  return Engine::Create(std::move(options), *std::move(source), std::make_unique<NoTracker>(),
+  return Engine::Create(std::move(options), *std::move(source), *std::move(tracker),
                         *std::move(store), hub);
 }
 
