@@ -1,0 +1,175 @@
+// A person at the page: looks at pixels, moves the mouse, presses keys. Nothing is injected.
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { chromium } from 'playwright-core';
+
+const FLAGS = [
+  '--no-sandbox', // the tests may run as root
+  '--no-first-run',
+  '--disable-quic',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+  '--use-gl=angle',
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
+];
+
+export class Expert {
+  static async open(executablePath, url) {
+    const profile = mkdtempSync(join(tmpdir(), 'saccade-browser-'));
+    const context = await chromium.launchPersistentContext(profile, {
+      executablePath,
+      args: FLAGS,
+      viewport: { width: 1280, height: 720 },
+    });
+    const page = context.pages()[0] ?? (await context.newPage());
+    const expert = new Expert(context, page, profile);
+    page.on('pageerror', (error) => expert.errors.push(error.message));
+    await page.goto(url);
+    return expert;
+  }
+
+  errors = [];
+
+  constructor(context, page, profile) {
+    this.context = context;
+    this.page = page;
+    this.profile = profile;
+  }
+
+  async close() {
+    await this.context.close();
+    rmSync(this.profile, { recursive: true, force: true });
+  }
+
+  /** Waits until the status reads like this. */
+  async waitForStatus(pattern, timeout) {
+    await this.page
+      .locator('header .status strong', { hasText: pattern })
+      .waitFor({ timeout })
+      .catch(async () => {
+        const text = await this.page.locator('header').innerText();
+        throw new Error(`status never matched ${pattern}: ${text.replace(/\n/g, ' | ')}`);
+      });
+  }
+
+  press(key) {
+    return this.page.keyboard.press(key);
+  }
+
+  /** Makes a pane the large one. */
+  async enlarge(pane) {
+    const main = this.page.locator('main');
+    if ((await main.getAttribute('data-main')) !== pane) await this.press('s');
+    await this.page.locator(`main[data-main="${pane}"]`).waitFor();
+    await this.page.waitForTimeout(300); // and drawn so
+  }
+
+  /** Picture on the canvas and the frame it is said to be, read in one go. */
+  async picture() {
+    const { id, url } = await this.page.evaluate(() => {
+      const canvas = document.querySelector('canvas.picture');
+      return { id: Number(canvas.dataset.frameId), url: canvas.toDataURL('image/png') };
+    });
+    return { id, png: Buffer.from(url.split(',')[1], 'base64') };
+  }
+
+  /** Marks drawn over the video, their frame, and where the picture lies under them. */
+  async marks() {
+    const { url, ...rest } = await this.page.evaluate(() => {
+      const canvas = document.querySelector('.video canvas.marks');
+      const picture = document.querySelector('canvas.picture');
+      const box = canvas.getBoundingClientRect();
+      const under = picture.getBoundingClientRect();
+      return {
+        id: Number(canvas.dataset.frameId),
+        url: canvas.toDataURL('image/png'),
+        left: under.left - box.left,
+        top: under.top - box.top,
+        scale: under.width / picture.width,
+        ratio: canvas.width / box.width,
+      };
+    });
+    return { ...rest, png: Buffer.from(url.split(',')[1], 'base64') };
+  }
+
+  /** The frame on the screen and where its picture lies on the page. */
+  look() {
+    return this.page.evaluate(() => {
+      const canvas = document.querySelector('canvas.picture');
+      const box = canvas.getBoundingClientRect();
+      const { width, height, dataset } = canvas;
+      return {
+        id: Number(dataset.frameId),
+        left: box.left,
+        top: box.top,
+        scale: box.width / width,
+        width,
+        height,
+      };
+    });
+  }
+
+  /** The eye above the map, as the page says it draws, and where the map lies. */
+  mapView() {
+    return this.page.evaluate(() => {
+      const canvas = document.querySelector('canvas.map');
+      const box = canvas.getBoundingClientRect();
+      const [x, y, z, ...rotation] = canvas.dataset.eye.split(' ').map(Number);
+      return {
+        pose: { translation_m: [x, y, z], rotation_xyzw: rotation },
+        focal: Number(canvas.dataset.focalPx),
+        left: box.left,
+        top: box.top,
+        width: box.width,
+        height: box.height,
+      };
+    });
+  }
+
+  /** True if a click there meets this pane and not something above it. */
+  isOver(pane, [x, y]) {
+    return this.page.evaluate(
+      ([selector, left, top]) => Boolean(document.elementFromPoint(left, top)?.closest(selector)),
+      [pane, x, y],
+    );
+  }
+
+  async click([x, y]) {
+    await this.page.mouse.move(x, y);
+    await this.page.mouse.down();
+    await this.page.mouse.up();
+  }
+
+  /** Frame and pixel of the last press on the video. */
+  async pressed() {
+    const text = await this.page.locator('.video').getAttribute('data-pressed');
+    const [id, u, v] = text.split(' ').map(Number);
+    return { id, pixel: [u, v] };
+  }
+
+  annotationIds() {
+    return this.page.evaluate(() =>
+      [...document.querySelectorAll('aside li')].map((li) => li.dataset.id),
+    );
+  }
+
+  /** Waits for a mark that was not there before; its id, or why there is none. */
+  async newAnnotation(before, timeoutMs = 8000) {
+    const end = Date.now() + timeoutMs;
+    while (Date.now() < end) {
+      const id = (await this.annotationIds()).find((known) => !before.includes(known));
+      if (id) return { id };
+      const note = await this.page.evaluate(() =>
+        [...document.querySelectorAll('.pane-note')]
+          .map((p) => p.textContent)
+          .find((t) => t.startsWith('Not placed')),
+      );
+      if (note) return { refused: note };
+      await this.page.waitForTimeout(20);
+    }
+    return { refused: 'no answer' };
+  }
+}

@@ -1,0 +1,70 @@
+// Projection through the camera's lens, written anew: the test does not trust the page's own.
+
+/** Rotates v by a unit quaternion [x, y, z, w]. */
+export function rotate([x, y, z, w], [a, b, c]) {
+  const t = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
+  return [
+    a + w * t[0] + y * t[2] - z * t[1],
+    b + w * t[1] + z * t[0] - x * t[2],
+    c + w * t[2] + x * t[1] - y * t[0],
+  ];
+}
+
+const inverseOf = ([x, y, z, w]) => [-x, -y, -z, w];
+export const minus = (a, b) => a.map((value, i) => value - b[i]);
+export const plus = (a, b) => a.map((value, i) => value + b[i]);
+export const times = (a, s) => a.map((value) => value * s);
+export const length = (a) => Math.hypot(...a);
+
+/** Pose as in --sim-truth: {rotation_xyzw, translation_m} of world_from_camera. */
+export const inCamera = (pose, point) =>
+  rotate(inverseOf(pose.rotation_xyzw), minus(point, pose.translation_m));
+
+export const inWorld = (pose, point) => plus(rotate(pose.rotation_xyzw, point), pose.translation_m);
+
+function distort(camera, x, y) {
+  const [k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0] = camera.distortion;
+  const s = x * x + y * y;
+  const f = 1 + k1 * s + k2 * s * s + k3 * s * s * s;
+  return [
+    x * f + 2 * p1 * x * y + p2 * (s + 2 * x * x),
+    y * f + p1 * (s + 2 * y * y) + 2 * p2 * x * y,
+  ];
+}
+
+/** Pixel of a point in the camera, brown_conrady or pinhole; undefined behind it. */
+export function project(camera, [x, y, z]) {
+  if (z <= 0) return undefined;
+  const [u, v] = distort(camera, x / z, y / z);
+  return [camera.fxPx * u + camera.cxPx, camera.fyPx * v + camera.cyPx];
+}
+
+/** The point at depth z whose pixel this is, by fixed-point iteration. */
+export function unproject(camera, [u, v], z) {
+  const wanted = [(u - camera.cxPx) / camera.fxPx, (v - camera.cyPx) / camera.fyPx];
+  let at = wanted;
+  for (let i = 0; i < 100; ++i) at = plus(at, minus(wanted, distort(camera, ...at)));
+  return [at[0] * z, at[1] * z, z];
+}
+
+/** Pixels along the 12 edges of a cube about a point, axes parallel to world, evenly spread. */
+export function cubePixels(camera, pose, centre, size) {
+  const corner = (i) =>
+    plus(centre, [
+      i & 1 ? size / 2 : -size / 2,
+      i & 2 ? size / 2 : -size / 2,
+      i & 4 ? size / 2 : -size / 2,
+    ]);
+  const out = [];
+  for (let i = 0; i < 8; ++i) {
+    for (const bit of [1, 2, 4]) {
+      if (i & bit) continue;
+      const a = project(camera, inCamera(pose, corner(i)));
+      const b = project(camera, inCamera(pose, corner(i | bit)));
+      if (!a || !b) continue;
+      const steps = Math.max(2, Math.ceil(2 * Math.hypot(a[0] - b[0], a[1] - b[1])));
+      for (let k = 0; k <= steps; ++k) out.push(plus(times(a, 1 - k / steps), times(b, k / steps)));
+    }
+  }
+  return out;
+}

@@ -1,0 +1,50 @@
+// The page in real Chromium against the real server on the simulator; prints what it measured.
+// usage: run.mjs [--server PATH] [--chromium PATH] [--seed N] [--shots DIR]
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { createServer } from 'node:net';
+import { tmpdir } from 'node:os';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { parseArgs } from 'node:util';
+
+const web = join(dirname(fileURLToPath(import.meta.url)), '..', '..');
+const { values: options } = parseArgs({
+  options: {
+    server: { type: 'string', default: join(web, '../build/release/bin/saccade-server') },
+    chromium: { type: 'string', default: '/usr/bin/chromium' },
+    seed: { type: 'string', default: '1' },
+    shots: { type: 'string' },
+  },
+});
+
+// 77 is CTest's "skipped".
+const needed = {
+  [options.server]: 'build saccade-server',
+  [options.chromium]: 'install chromium',
+  [join(web, 'dist/index.html')]: 'run npm run build in web/',
+  [join(web, 'node_modules/playwright-core')]: 'run npm ci in web/',
+};
+for (const [path, remedy] of Object.entries(needed)) {
+  if (existsSync(path)) continue;
+  console.log(`skipped: no ${path}; ${remedy}`);
+  process.exit(77);
+}
+const { runChecks } = await import('./checks.mjs');
+
+const folder = mkdtempSync(join(tmpdir(), 'saccade-browser-test-'));
+/** A port that is free now: the restarted server has to come back to the same one. */
+const port = await new Promise((resolve) => {
+  const probe = createServer().listen(0, '127.0.0.1', () => {
+    const found = probe.address().port;
+    probe.close(() => resolve(found));
+  });
+});
+let failures = 1;
+try {
+  failures = await runChecks({ ...options, folder, port });
+} catch (error) {
+  console.error(error);
+} finally {
+  rmSync(folder, { recursive: true, force: true });
+}
+process.exit(failures === 0 ? 0 : 1);

@@ -1,0 +1,76 @@
+// The real saccade-server as a child process, and what its simulator says is true.
+import { spawn } from 'node:child_process';
+import { closeSync, openSync, readSync } from 'node:fs';
+
+/** Starts a server; resolves when it serves. `http` is its page's address. */
+export async function startServer(binary, args) {
+  const child = spawn(binary, args, { stdio: ['ignore', 'pipe', 'pipe'] });
+  let errors = '';
+  child.stderr.on('data', (data) => {
+    errors = (errors + data).slice(-4000);
+  });
+  const exited = new Promise((resolve) => child.once('exit', resolve));
+  const ready = await new Promise((resolve, reject) => {
+    let out = '';
+    child.stdout.on('data', (data) => {
+      out += data;
+      const line = out.split('\n').find((text) => text.includes('"ready"'));
+      if (line) resolve(JSON.parse(line));
+    });
+    child.once('error', reject);
+    exited.then((code) => reject(new Error(`saccade-server ended with ${code}:\n${errors}`)));
+  });
+  return {
+    http: `http://${ready.http}`,
+    /** Ends it as a person would, then by force; returns how long it took [ms]. */
+    async stop() {
+      const begin = performance.now();
+      child.kill('SIGTERM');
+      const force = setTimeout(() => child.kill('SIGKILL'), 5000);
+      await exited;
+      clearTimeout(force);
+      return performance.now() - begin;
+    },
+    errors: () => errors,
+  };
+}
+
+/** `--sim-truth` by frame id, read as it grows. */
+export class Truth {
+  #file;
+  #rest = Buffer.alloc(0);
+  #chunk = Buffer.alloc(1 << 20);
+  #frames = new Map();
+
+  constructor(path) {
+    this.#file = openSync(path, 'r');
+  }
+
+  /** Truth of a frame; undefined if the simulator has not made it. */
+  frame(id) {
+    if (!this.#frames.has(id)) this.#read();
+    return this.#frames.get(id);
+  }
+
+  frames() {
+    this.#read();
+    return [...this.#frames.values()];
+  }
+
+  close() {
+    closeSync(this.#file);
+  }
+
+  #read() {
+    for (;;) {
+      const size = readSync(this.#file, this.#chunk, 0, this.#chunk.length, null);
+      if (size === 0) return;
+      this.#rest = Buffer.concat([this.#rest, this.#chunk.subarray(0, size)]);
+      for (let end; (end = this.#rest.indexOf(10)) >= 0; ) {
+        const frame = JSON.parse(this.#rest.subarray(0, end).toString());
+        this.#rest = this.#rest.subarray(end + 1);
+        this.#frames.set(frame.frame, frame);
+      }
+    }
+  }
+}
