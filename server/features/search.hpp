@@ -35,7 +35,7 @@ struct SearchOptions {
   /// A rival peak counts as another place if at least this far from the best [px].
   int rival_distance_px = 4;
   SubPixel sub_pixel = SubPixel::kLucasKanade;
-  int max_iterations = 6;  // of Lucas-Kanade
+  int max_iterations = 12;  // of Lucas-Kanade; a blurred picture needs more than 3
   /// Places with less contrast than this never match [grey levels, standard deviation].
   double min_deviation = 4.0;
   /// Noise floor added to the estimated match covariance [px].

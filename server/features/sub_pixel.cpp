@@ -12,7 +12,7 @@ constexpr int kInside = 13;           // largest inside: the template without it
 constexpr int kRegion = kInside + 6;  // picture around the start that a step may need
 constexpr int kRegionStride = 40;
 constexpr double kMaxShift = 1.5;    // [px]
-constexpr double kConverged = 0.01;  // [px]
+constexpr double kConverged = 0.02;  // [px]
 
 using Row = Eigen::Map<const Eigen::Array<float, Eigen::Dynamic, 1>>;
 

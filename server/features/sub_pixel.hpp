@@ -22,7 +22,7 @@ struct Alignment {
 ///
 /// At every step the picture around the current place is expressed by the template, its gradients
 /// and a constant (a linear fit with fixed normal equations); the gradients' share is the shift.
-/// Converged: last step below 0.01 px and within 1.5 px of `start`. Otherwise `pixel` is `start`,
+/// Converged: last step below 0.02 px and within 1.5 px of `start`. Otherwise `pixel` is `start`,
 /// and the covariance is of the fit there.
 Alignment AlignTemplate(const cv::Mat& image, const CorrelationTemplate& templ,
                         const Eigen::Vector2d& start, int max_iterations);
