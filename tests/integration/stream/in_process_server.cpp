@@ -1,0 +1,123 @@
+#include "tests/integration/stream/in_process_server.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <opencv2/imgproc.hpp>
+#include <thread>
+
+namespace saccade::testing {
+namespace {
+
+class MovingTexture final : public FrameSource {
+ public:
+  explicit MovingTexture(const InProcessOptions& options) : options_(options) {
+    CameraIntrinsics intrinsics;
+    intrinsics.width = options.width;
+    intrinsics.height = options.height;
+    intrinsics.fx = intrinsics.fy = 0.8 * options.width;
+    intrinsics.cx = 0.5 * (options.width - 1);
+    intrinsics.cy = 0.5 * (options.height - 1);
+    info_.uri = "test:texture";
+    info_.camera = std::make_shared<CameraModel>(intrinsics);
+    texture_.create(options.height, options.width + 300, CV_8UC1);
+    cv::randu(texture_, 0, 255);
+    cv::GaussianBlur(texture_, texture_, cv::Size(0, 0), 4.0);
+  }
+
+  const SourceInfo& info() const override { return info_; }
+  std::uint64_t bad_frames() const override { return 0; }
+
+  absl::StatusOr<std::optional<Frame>> Next() override {
+    if (options_.frames && next_ >= *options_.frames) return std::nullopt;
+    std::this_thread::sleep_until(start_ + next_ * std::chrono::nanoseconds(33'333'333));
+    Frame frame;
+    frame.id = next_++;
+    frame.capture_time_ns = frame.received_time_ns = MonotonicNow();
+    const int shift = static_cast<int>(2 * frame.id % 300);
+    frame.grey = texture_(cv::Rect(shift, 0, options_.width, options_.height)).clone();
+    frame.camera = info_.camera;
+    return frame;
+  }
+
+ private:
+  const InProcessOptions options_;
+  SourceInfo info_;
+  cv::Mat texture_;
+  std::uint64_t next_ = 0;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+class ScriptedTracker final : public FrameTracker {
+ public:
+  explicit ScriptedTracker(std::function<void()> before_frame)
+      : before_frame_(std::move(before_frame)) {}
+
+  std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override {
+    before_frame_();
+    auto snapshot = std::make_shared<MapSnapshot>();
+    snapshot->frame_id = frame.id;
+    snapshot->capture_time_ns = frame.capture_time_ns;
+    snapshot->status = TrackingStatus::kTracking;
+    snapshot->quality = TrackingQuality::kGood;
+    snapshot->metric = true;
+    snapshot->map_generation = generation_;
+    snapshot->attempted = snapshot->matched = 20;
+    for (int i = 0; i < 20; ++i) {
+      FeatureSnapshot feature;
+      feature.id = static_cast<FeatureId>(i + 1);
+      feature.state = FeatureState::kMeasured;
+      feature.point_in_world = Eigen::Vector3d(0.25 * (i % 5 - 2), 0.25 * (i / 5 - 1.5), 2.0);
+      feature.covariance_in_world = feature.covariance_in_camera =
+          1e-6 * Eigen::Matrix3d::Identity();
+      feature.depth_known = true;
+      feature.pixel = frame.camera->Project(feature.point_in_world);
+      feature.matched_count = 50;
+      snapshot->features.push_back(feature);
+    }
+    return snapshot;
+  }
+  void Reset() override { ++generation_; }
+  absl::StatusOr<FeatureId> SeedFeature(const Frame&, const Rigid3&, const Eigen::Vector2d&, double,
+                                        double) override {
+    return absl::NotFoundError("scripted: no new features");
+  }
+
+ private:
+  const std::function<void()> before_frame_;
+  std::uint64_t generation_ = 0;
+};
+
+template <typename T>
+T Must(absl::StatusOr<T> value) {
+  if (value.ok()) return *std::move(value);
+  std::fprintf(stderr, "%s\n", value.status().ToString().c_str());
+  std::abort();
+}
+
+}  // namespace
+
+InProcessServer::InProcessServer(const InProcessOptions& options) {
+  std::unique_ptr<AnnotationStore> store;
+  if (!options.data_dir.empty()) store = Must(AnnotationStore::Open(options.data_dir));
+  EngineOptions engine_options;
+  engine_options.version = "test";
+  engine_options.mailbox = options.mailbox;
+  engine_ = Must(Engine::Create(engine_options, std::make_unique<MovingTexture>(options),
+                                std::make_unique<ScriptedTracker>(options.before_frame),
+                                std::move(store), hub_));
+  hub_.Connect(engine_.get());
+  RpcServerOptions rpc_options;
+  rpc_options.port = 0;
+  rpc_ = Must(RpcServer::Start(rpc_options, *engine_, hub_));
+  engine_->Start();
+}
+
+InProcessServer::~InProcessServer() { Stop(); }
+
+void InProcessServer::Stop() {
+  hub_.CloseAll(absl::UnavailableError("the server is shutting down"));
+  engine_->Stop();
+  rpc_->Stop(std::chrono::milliseconds(500));
+}
+
+}  // namespace saccade::testing
