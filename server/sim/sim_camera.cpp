@@ -7,7 +7,8 @@
 namespace saccade {
 namespace {
 
-constexpr int kMaxSubExposures = 10;
+constexpr int kMaxSubExposures = 8;
+constexpr double kStep_px = 1.4;         // between sub-exposures; the lens softens as much
 constexpr double kNearestThing_m = 0.6;  // for the blur that translation causes
 
 }  // namespace
@@ -40,7 +41,7 @@ int SimCamera::SubExposures(double time_s) const {
   const double moved_rad = RotationAngle(before, after) +
                            (after.translation - before.translation).norm() / kNearestThing_m;
   const double moved_px = moved_rad / camera_.RadiansPerPixel();
-  return std::clamp(static_cast<int>(std::ceil(moved_px)), 1, kMaxSubExposures);
+  return std::clamp(static_cast<int>(std::ceil(moved_px / kStep_px)), 1, kMaxSubExposures);
 }
 
 absl::StatusOr<cv::Mat> SimCamera::Take(std::uint64_t frame, bool with_noise) {

@@ -30,7 +30,7 @@ class SimCamera {
 
  private:
   SimCamera(const CameraModel& camera, const SimOptions& options, const Wearer& wearer);
-  /// Moments to average, so that nothing moves more than a pixel between two of them.
+  /// Moments to average, so that nothing moves much more than a pixel between two of them.
   int SubExposures(double time_s) const;
 
   CameraModel camera_;

@@ -25,7 +25,7 @@ struct SimOptions {
   int width = 640, height = 480;              // width, height [px]; the field of view stays
   double fps = 30.0;                          // fps
   LensModel lens = LensModel::kBrownConrady;  // lens: pinhole, brown_conrady
-  double supersampling = 1.25;  // supersampling: drawn pixels per camera pixel, 1 .. 4
+  double supersampling = 1.15;  // supersampling: drawn pixels per camera pixel, 1 .. 4
 
   /// Parses a whole source URI. InvalidArgument names the key and what it may be.
   static absl::StatusOr<SimOptions> FromUri(std::string_view uri);
