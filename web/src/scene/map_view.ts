@@ -13,6 +13,15 @@ import { PathLine } from './path_line';
 
 const FIELD_OF_VIEW_DEG = 45;
 
+/** True without a graphics card, where smooth edges would cost more than the rest together. */
+function drawsInSoftware(): boolean {
+  const gl = document.createElement('canvas').getContext('webgl');
+  const info = gl?.getExtension('WEBGL_debug_renderer_info');
+  const name: unknown = info && gl?.getParameter(info.UNMASKED_RENDERER_WEBGL);
+  gl?.getExtension('WEBGL_lose_context')?.loseContext();
+  return typeof name === 'string' && /swiftshader|llvmpipe|software/i.test(name);
+}
+
 /** The picture shown and where it was taken from. */
 export interface ShownFrame {
   readonly frameId: number;
@@ -46,7 +55,7 @@ export class MapView {
     picture: HTMLCanvasElement,
     private readonly session: Session,
   ) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware() });
     this.renderer.setClearColor('#131415');
     this.frustum = new Frustum(picture);
     this.scene.add(groundGrid(), this.cloud.object, this.path.object, this.frustum.object);

@@ -51,12 +51,16 @@ export class OrbitCamera {
     this.jump({ ...this.goal, target: add(this.goal.target, shift) });
   }
 
-  /** Closer (below 1) or farther, eased: a wheel comes in notches. */
-  zoom(factor: number): void {
-    this.goal = {
-      ...this.goal,
-      distance: Math.min(Math.max(this.goal.distance * factor, 0.05), 500),
-    };
+  /**
+   * Closer (below 1) or farther, eased: a wheel comes in notches. What is at (`right`, `down`) from
+   * the middle, in fractions of the distance, stays where it is on the screen.
+   */
+  zoom(factor: number, right = 0, down = 0): void {
+    const from = this.goal.distance;
+    const to = Math.min(Math.max(from * factor, 0.05), 500);
+    const { x, y } = this.basis(this.goal);
+    const shift = add(scale(x, right * (from - to)), scale(y, down * (from - to)));
+    this.goal = { ...this.goal, distance: to, target: add(this.goal.target, shift) };
   }
 
   /** Eases to look at a sphere [m]. */

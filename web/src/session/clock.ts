@@ -36,18 +36,23 @@ export class ClockOffset {
 }
 
 /**
- * When the browser itself sent the last request whose address ends in `suffix`, and when its answer
- * began to arrive [ms, this page's clock]. The page's own stamps would include its waiting.
+ * When the browser itself sent the request whose address ends in `suffix` and that this page made
+ * at `askedMs` or later, and when its answer began to arrive [ms, this page's clock]: the page's own
+ * stamps would include its waiting. Undefined if the browser has not recorded it (yet).
  */
-export function wireTimes(suffix: string): { sentMs: number; answeredMs: number } | undefined {
-  const entries = performance.getEntriesByType('resource') as PerformanceResourceTiming[];
-  const last = entries.filter(({ name }) => name.endsWith(suffix)).at(-1);
+export function wireTimes(
+  suffix: string,
+  askedMs: number,
+): { sentMs: number; answeredMs: number } | undefined {
+  const origin = performance.timeOrigin;
+  const entry = (performance.getEntriesByType('resource') as PerformanceResourceTiming[])
+    .filter(({ name }) => name.endsWith(suffix))
+    .at(-1);
   performance.clearResourceTimings(); // else the browser stops recording at 250
-  if (!last || last.requestStart === 0 || last.responseStart === 0) return undefined;
-  return {
-    sentMs: performance.timeOrigin + last.requestStart,
-    answeredMs: performance.timeOrigin + last.responseStart,
-  };
+  // Half a millisecond: browsers round these times.
+  if (!entry || origin + entry.startTime < askedMs - 0.5) return undefined;
+  if (entry.requestStart === 0 || entry.responseStart === 0) return undefined;
+  return { sentMs: origin + entry.requestStart, answeredMs: origin + entry.responseStart };
 }
 
 /** This page's clock [ms], the same in its workers. */

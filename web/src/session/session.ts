@@ -172,7 +172,8 @@ export class Session {
       const t1 = Number(reply.serverReceiveNs) / 1e6;
       const t2 = Number(reply.serverSendNs) / 1e6;
       const answered = pageNowMs();
-      const wire = wireTimes('/Ping');
+      await sleep(20, signal); // the browser records a request shortly after it has ended
+      const wire = wireTimes('/Ping', sent);
       this.clock.add(wire?.sentMs ?? sent, t1, t2, wire?.answeredMs ?? answered);
     } catch {
       // The stream's silence says the same, and says it to the reader.

@@ -14,7 +14,7 @@ export interface Landing {
 }
 
 const FEATURE_PX = 20; // as the server's (slam-spec section 9): such a feature gives its depth
-const SNAP_PX = 8; // in the map, a click this near to a feature means the feature itself
+const SNAP_PX = 6; // in the map, a click this near to a feature means the feature itself
 const NEAR_PX = 120;
 const PLANE_RESIDUAL_M = 0.02;
 const GUESSED_DEPTH_M = 1;

@@ -80,7 +80,7 @@ export class App {
     this.stage.dataset['main'] = state.main;
     if (player.draw()) {
       this.measure();
-      if (!this.mapLoading) this.element.dataset['firstPictureMs'] = performance.now().toFixed(0);
+      this.element.dataset['firstPictureMs'] ??= performance.now().toFixed(0);
       this.loadMap();
     }
     this.video.draw();

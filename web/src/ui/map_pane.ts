@@ -55,6 +55,15 @@ export class MapPane {
     return { u: clientX - box.left - 0.5, v: clientY - box.top - 0.5 };
   }
 
+  /** Closer or farther, keeping what is under the pointer there. */
+  zoomAt(factor: number, clientX: number, clientY: number): void {
+    const view = this.view();
+    if (!this.map || !view) return;
+    const { fx, fy, cx, cy } = view.camera.intrinsics;
+    const { u, v } = this.pixelAt(clientX, clientY);
+    this.map.orbit.zoom(factor, (u - cx) / fx, (v - cy) / fy);
+  }
+
   /** `screenFps`: what this computer manages; with little, the map yields to the video. */
   draw(nowMs: number, screenFps: number): void {
     const { map, element } = this;

@@ -7,6 +7,7 @@ const LINE = '#ffffff';
 const ACCENT = '#c4b0ff';
 const HALO = 'rgba(0, 0, 0, 0.65)';
 const AXIS = '#c9ccd0';
+const MAX_RING_PX = 120;
 const FONT = '600 13px system-ui, sans-serif';
 
 /** Draws pixels of a view onto a canvas laid over it. */
@@ -162,10 +163,12 @@ export class Painter {
   /** Where a click lands: a ring as large as its uncertainty [picture px], and how large in words. */
   ring(at: Pixel, radius: number | undefined, words: string): void {
     const { context, ratio } = this;
-    const r = Math.min(Math.max((radius ?? 0) * this.scale, 5 * ratio), 400 * ratio);
+    const size = (radius ?? 0) * this.scale;
+    const r = Math.min(Math.max(size, 5 * ratio), MAX_RING_PX * ratio);
     context.beginPath();
     context.arc(this.x(at), this.y(at), r, 0, 2 * Math.PI);
-    if (radius === undefined) context.setLineDash([3 * ratio, 4 * ratio]);
+    // Dashed: not to scale, the words say how large.
+    if (radius === undefined || size > r) context.setLineDash([3 * ratio, 4 * ratio]);
     this.stroke(HALO, 4);
     this.stroke(ACCENT, 1.6);
     context.setLineDash([]);

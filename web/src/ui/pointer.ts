@@ -66,7 +66,8 @@ export function handleMapPointer(pane: MapPane, gestures: MapGestures): void {
     'wheel',
     (event) => {
       event.preventDefault();
-      pane.map?.orbit.zoom(Math.exp(Math.max(-100, Math.min(100, event.deltaY)) * 0.0015));
+      const factor = Math.exp(Math.max(-100, Math.min(100, event.deltaY)) * 0.0015);
+      pane.zoomAt(factor, event.clientX, event.clientY);
       gestures.moved();
     },
     { passive: false },

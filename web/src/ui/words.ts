@@ -108,8 +108,8 @@ export function anchorWords(
   if (!anchor.pointInWorld) return { text: 'place not known', warn: true };
   const px = anchor.errorPx === undefined ? 'out of view' : `${anchor.errorPx.toFixed(1)} px`;
   const size = metric ? ` · ${millimetres(anchor.errorMm)}` : ' · scale unknown';
-  const provisional = anchor.state === 'provisional' ? ' · provisional' : '';
-  return { text: `${px}${size}${provisional}`, warn: false };
+  const provisional = anchor.state === 'provisional' ? 'provisional · ' : '';
+  return { text: `${provisional}${px}${size}`, warn: false };
 }
 
 function millimetres(mm: number): string {

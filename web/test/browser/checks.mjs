@@ -46,11 +46,12 @@ export async function runChecks({ server: binary, chromium, seed, shots, folder,
     context.truth = new Truth(truthFile);
     context.expert = await Expert.open(chromium, context.server.http);
     await context.expert.waitForStatus(/^tracking/, 60_000);
+    await context.expert.page.locator('.app[data-first-picture-ms]').waitFor();
     await firstPicture(context);
     await decodedPictures(context);
     await clicks(context);
     await drawnCubes(context);
-    await restart(context, start);
+    if (!process.env['SACCADE_VERBOSE']) await restart(context, start);
     context.check(
       'page errors',
       context.expert.errors.length === 0,
@@ -118,6 +119,15 @@ async function clicks(context) {
       const at = known.get(id)?.pointInWorldM;
       return at ? length(minus([at.x, at.y, at.z], point)) / depth : Infinity;
     });
+    if (process.env['SACCADE_VERBOSE']) {
+      for (const { id, name, point, depth } of placed) {
+        const { pointInWorldM: p, method, state } = known.get(id) ?? {};
+        const text = p ? [p.x, p.y, p.z].map((value) => value.toFixed(3)) : 'none';
+        console.log(
+          `      ${name}: ${text} for ${point.map((v) => v.toFixed(3))}, depth ${depth.toFixed(2)} m, method ${method}, state ${state}`,
+        );
+      }
+    }
     const objects = new Set(placed.map(({ name }) => name)).size;
     check(
       `clicks in the ${pane}, median error below 2 % of depth`,
@@ -190,10 +200,29 @@ async function clickedPoint(expert, truth, camera, name) {
   return { point: inWorld(frame.world_from_camera, unproject(camera, pixel, depth)), depth };
 }
 
+/** As a person would: turn the wheel over the object until it is near, then click it. */
 async function aimInMap({ expert, truth }, used) {
   const { id } = await expert.look();
   const frame = truth.frame(id);
   if (!frame) return undefined;
+  await expert.press('h');
+  await sleep(400);
+  const names = candidates(frame, used).map(({ name }) => name);
+  const found = await findInMap(expert, frame, names);
+  if (!found) return undefined;
+  await expert.page.mouse.move(...found.at);
+  for (let i = 0; i < 8; ++i) await expert.page.mouse.wheel(0, -100);
+  await sleep(600);
+  const near = await findInMap(expert, frame, [found.name]);
+  if (!near) return undefined;
+  await expert.click(near.at);
+  const point = near.point;
+  const depth = inCamera(frame.world_from_camera, point)[2];
+  return { name: near.name, where: () => Promise.resolve({ point, depth }) };
+}
+
+/** Where the first of these objects that can be clicked lies on the page. */
+async function findInMap(expert, frame, names) {
   const view = await expert.mapView();
   const eye = {
     fxPx: view.focal,
@@ -202,14 +231,12 @@ async function aimInMap({ expert, truth }, used) {
     cyPx: view.height / 2,
     distortion: [],
   };
-  for (const { name, point_in_world_m: point } of candidates(frame, used)) {
+  for (const name of names) {
+    const { point_in_world_m: point } = frame.objects.find((object) => object.name === name);
     const pixel = project(eye, inCamera(view.pose, point));
     if (!pixel) continue;
     const at = [view.left + pixel[0], view.top + pixel[1]];
-    if (!(await expert.isOver('.map3d', at))) continue;
-    await expert.click(at);
-    const depth = inCamera(frame.world_from_camera, point)[2];
-    return { name, where: () => Promise.resolve({ point, depth }) };
+    if (await expert.isOver('.map3d', at)) return { name, point, at };
   }
   return undefined;
 }
