@@ -13,7 +13,7 @@ void BookRow(RoomBuilder& room, const RoomMaterials& m, cv::RNG& rng, float x0, 
     if (x + width > x1) break;
     const int kind = rng.uniform(0, kSpineColumns * kSpineRows);
     const float height = std::min(max_height, static_cast<float>(rng.uniform(0.17, 0.27)));
-    const float depth = 0.7f * height;
+    const float depth = std::min(0.7f * height, 0.16f);
     Paint spine = RoomMaterials::Cell(m.spines, kind % kSpineColumns, kind / kSpineColumns,
                                       kSpineColumns, kSpineRows);
     BoxPaint book(spine);
