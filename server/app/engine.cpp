@@ -233,7 +233,10 @@ void Engine::MakeStill(StillRequest request) {
   request.done(Still{std::make_shared<const std::string>(png.begin(), png.end()), frame.tracked});
 }
 
-cv::Mat Engine::DrawAugmented(const TrackedFrame& frame) const { return PictureOf(*frame.frame); }
+cv::Mat Engine::DrawAugmented(const TrackedFrame& frame) const {
+  return Augment(*frame.frame, *frame.tracked.snapshot, *frame.tracked.annotations,
+                 options_.overlay);
+}
 
 EngineStatistics Engine::Statistics() const {
   const Timestamp now_ns = MonotonicNow();

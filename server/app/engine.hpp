@@ -13,6 +13,7 @@
 #include "server/app/frame_tracker.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/capture/frame_source.hpp"
+#include "server/overlay/overlay.hpp"
 #include "server/pipeline/inbox.hpp"
 #include "server/pipeline/rolling_statistics.hpp"
 #include "server/rpc/backend.hpp"
@@ -26,6 +27,7 @@ struct EngineOptions {
   int video_bit_rate_bit_s = 0;  // per view; 0: by picture size
   std::size_t mailbox = 64;      // commands that may wait for the tracker thread
   AnchorOptions anchors;
+  OverlayOptions overlay;
 };
 
 /// Capture to packets: owns the threads and what they share.

@@ -2,8 +2,10 @@
 #include <absl/status/status.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "server/app/engine.hpp"
@@ -80,6 +82,16 @@ void SayReady(const ServerConfig& config, int grpc_port, int http_port) {
   std::fflush(stdout);
 }
 
+// One line, also where a library's own words have several.
+void SayProblem(const absl::Status& problem) {
+  std::string line(problem.message());
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  line.erase(
+      std::unique(line.begin(), line.end(), [](char a, char b) { return a == ' ' && b == ' '; }),
+      line.end());
+  std::fprintf(stderr, "saccade-server: %s\n", line.c_str());
+}
+
 absl::Status Serve(const ServerConfig& config) {
   const sigset_t signals = BlockSignals();
   StreamHub hub;
@@ -113,19 +125,16 @@ absl::Status Serve(const ServerConfig& config) {
 }  // namespace saccade
 
 int main(int argc, char** argv) {
-  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) {
-    std::fprintf(stderr,
-                 "saccade-server: built for x86-64-v3 (AVX2, FMA); this processor is older\n");
-    return 1;
-  }
+  // gRPC's own words for what is said below in one line; whoever wants them sets the variable.
+  setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   const auto config = saccade::ServerConfig::FromCommandLine(argc, argv);
   if (!config.ok()) {
-    std::fprintf(stderr, "saccade-server: %s\n", std::string(config.status().message()).c_str());
+    saccade::SayProblem(config.status());
     return 2;
   }
   if (!config->has_value()) return 0;
   const absl::Status served = saccade::Serve(**config);
   if (served.ok()) return 0;
-  std::fprintf(stderr, "saccade-server: %s\n", std::string(served.message()).c_str());
+  saccade::SayProblem(served);
   return 1;
 }

@@ -1,0 +1,26 @@
+#include "server/app/frame_clock.hpp"
+
+#include <gtest/gtest.h>
+
+namespace saccade {
+namespace {
+
+constexpr Timestamp kMs = 1'000'000;
+
+TEST(FrameClock, ALiveSourceIsOnTheMonotonicClock) {
+  FrameClock clock;
+  EXPECT_EQ(clock.ToMonotonic(5'000 * kMs, 5'009 * kMs), 5'000 * kMs);
+  EXPECT_EQ(clock.ToMonotonic(5'033 * kMs, 5'200 * kMs), 5'033 * kMs);
+}
+
+TEST(FrameClock, ARecordingKeepsItsDistancesAndNeverComesFromTheFuture) {
+  FrameClock clock;
+  const Timestamp recorded = 1'305'031'102'000 * kMs;  // 2011
+  // The first frame arrives 20 ms late, the second in time, the third 5 ms late.
+  EXPECT_EQ(clock.ToMonotonic(recorded, 120 * kMs), 120 * kMs);
+  EXPECT_EQ(clock.ToMonotonic(recorded + 33 * kMs, 133 * kMs), 133 * kMs);
+  EXPECT_EQ(clock.ToMonotonic(recorded + 66 * kMs, 171 * kMs), 166 * kMs);
+}
+
+}  // namespace
+}  // namespace saccade

@@ -1,0 +1,110 @@
+#include "server/app/server_config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+
+namespace saccade {
+namespace {
+
+using ::testing::HasSubstr;
+
+absl::StatusOr<std::optional<ServerConfig>> Parse(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "saccade-server");
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  return ServerConfig::FromCommandLine(static_cast<int>(argv.size()), argv.data());
+}
+
+ServerConfig Good(const std::vector<std::string>& arguments) {
+  const auto config = Parse(arguments);
+  EXPECT_TRUE(config.ok()) << config.status();
+  return config.ok() && config->has_value() ? **config : ServerConfig{};
+}
+
+std::string Error(const std::vector<std::string>& arguments) {
+  const auto config = Parse(arguments);
+  EXPECT_FALSE(config.ok());
+  return std::string(config.status().message());
+}
+
+// A file in the test's own folder.
+std::string Toml(const std::string& text) {
+  const std::string path = ::testing::TempDir() + "/saccade_config_test.toml";
+  std::ofstream(path) << text;
+  return path;
+}
+
+TEST(ServerConfig, DefaultsAreTheContracts) {
+  const ServerConfig config = Good({"--source", "sim:desk"});
+  EXPECT_EQ(config.grpc.ToString(config.grpc.port), "127.0.0.1:50051");
+  EXPECT_EQ(config.http.ToString(config.http.port), "127.0.0.1:8080");
+  EXPECT_FALSE(config.every_frame);
+  EXPECT_FALSE(config.run_for_s);
+}
+
+TEST(ServerConfig, EveryFlagOfTheContract) {
+  const ServerConfig config =
+      Good({"--source", "sim:desk", "--mount",   "none",   "--data-dir",  "/d",     "--camera",
+            "c.yaml",   "--grpc",   "[::1]:0",   "--http", "localhost:0", "--gl",   "osmesa",
+            "--speed",  "max",      "--run-for", "2.5",    "--sim-truth", "t.jsonl"});
+  EXPECT_EQ(config.data_dir, "/d");
+  EXPECT_EQ(config.camera_file, "c.yaml");
+  EXPECT_EQ(config.grpc.ToString(7), "[::1]:7");
+  EXPECT_EQ(config.http.ToString(7), "127.0.0.1:7");
+  EXPECT_TRUE(config.every_frame);
+  EXPECT_EQ(config.run_for_s, 2.5);
+  EXPECT_EQ(config.sim_truth, "t.jsonl");
+}
+
+TEST(ServerConfig, BadUsageNamesTheFlagAndTheRemedy) {
+  EXPECT_THAT(Error({}), HasSubstr("--source"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--nonsense"}), HasSubstr("--nonsense"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--speed", "fast"}), HasSubstr("--speed"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", "50051"}), HasSubstr("--grpc"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", "127.0.0.1:70000"}), HasSubstr("65535"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", "example.org:1"}), HasSubstr("IP address"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--run-for", "-1"}), HasSubstr("--run-for"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--run-for", "nan"}), HasSubstr("--run-for"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "dynamixel:/dev/x"}), HasSubstr("--mount"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--gl", "vulkan"}), HasSubstr("--gl"));
+  EXPECT_THAT(Error({"--source", "dataset:/x", "--sim-truth", "t"}), HasSubstr("--sim-truth"));
+}
+
+TEST(ServerConfig, BeyondThisMachineOnlyWithInsecure) {
+  EXPECT_THAT(Error({"--source", "sim:desk", "--http", "0.0.0.0:8080"}), HasSubstr("--insecure"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", "[::]:1"}), HasSubstr("--insecure"));
+  EXPECT_EQ(Good({"--source", "sim:desk", "--http", "0.0.0.0:1", "--insecure"}).http.host,
+            "0.0.0.0");
+}
+
+TEST(ServerConfig, TheFileIsReadAndFlagsWin) {
+  const std::string file = Toml(
+      "source = \"sim:desk\"\nseed = 9\ngrpc = \"127.0.0.1:1\"\n[video]\nbit_rate_bit_s = 900000\n"
+      "[tracker]\nfeatures_in_view = 40\n");
+  const ServerConfig config = Good({"--config", file, "--grpc", "127.0.0.1:2"});
+  EXPECT_EQ(config.source, "sim:desk");
+  EXPECT_EQ(config.seed, 9u);
+  EXPECT_EQ(config.grpc.port, 2);
+  EXPECT_EQ(config.video_bit_rate_bit_s, 900'000);
+  EXPECT_EQ(config.config_file, file);
+}
+
+TEST(ServerConfig, ABadFileIsNamedWithItsKey) {
+  EXPECT_THAT(Error({"--config", "/nowhere.toml"}), HasSubstr("/nowhere.toml"));
+  EXPECT_THAT(Error({"--config", Toml("sorce = \"sim:desk\"")}), HasSubstr("unknown key sorce"));
+  EXPECT_THAT(Error({"--config", Toml("[video]\nrate = 1")}), HasSubstr("video.rate"));
+  EXPECT_THAT(Error({"--config", Toml("source = 4")}), HasSubstr("saccade_config_test.toml"));
+  EXPECT_THAT(Error({"--config", Toml("source = ")}), HasSubstr("saccade_config_test.toml"));
+}
+
+TEST(ServerConfig, VersionPrintsAndGivesNothing) {
+  const auto config = Parse({"--version"});
+  ASSERT_TRUE(config.ok());
+  EXPECT_FALSE(config->has_value());
+}
+
+}  // namespace
+}  // namespace saccade
