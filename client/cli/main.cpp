@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -25,6 +26,8 @@ int Fail(absl::string_view problem) {
 
 int main(int argc, char** argv) {
   using namespace saccade;
+  // gRPC's own words for what is said below in one line; whoever wants them sets the variable.
+  setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   cli::ParseResult parsed = cli::ParseCommandLine(argc, argv);
   if (!parsed.options) return parsed.exit_code;
   net::ConnectionOptions& options = parsed.options->connection;

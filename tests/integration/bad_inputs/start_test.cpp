@@ -1,0 +1,184 @@
+// What the server refuses to start on, and what it goes on without.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/bad_inputs/table.hpp"
+#include "tests/integration/support/small_dataset.hpp"
+
+namespace saccade::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+void Write(const fs::path& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+std::string Camera(const std::string& model, const std::string& rest = "") {
+  return "model: " + model +
+         "\nwidth: 320\nheight: 240\nfx: 288\nfy: 288\ncx: 159.5\ncy: 119.5\nfps: 30\n" + rest;
+}
+
+class BadDataSet : public ::testing::Test {
+ protected:
+  // A good data set of a few frames that `spoil` breaks, as arguments.
+  std::vector<std::string> Spoiled(const std::function<void(const fs::path&)>& spoil) {
+    const fs::path set = folder_.path() + "/set";
+    fs::remove_all(set);
+    WriteSmallDataset(set, {.frames = 5});
+    spoil(set);
+    return {"--source", "dataset:" + set.string(), "--data-dir", folder_ / "data"};
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(BadDataSet, ListIsRefusedWithFileLineAndRemedy) {
+  const auto refuse = [&](const std::string& input, const std::string& part,
+                          const std::function<void(const fs::path&)>& spoil) {
+    ExpectRefusedStart(input, Spoiled(spoil), 1, part);
+  };
+  refuse("data set: folder does not exist", "set", [](const fs::path& p) { fs::remove_all(p); });
+  refuse("data set: no rgb.txt", "rgb.txt", [](const fs::path& p) { fs::remove(p / "rgb.txt"); });
+  refuse("rgb.txt: empty", "rgb.txt", [](const fs::path& p) { Write(p / "rgb.txt", ""); });
+  refuse("rgb.txt: time is a word", "rgb.txt:1",
+         [](const fs::path& p) { Write(p / "rgb.txt", "soon rgb/0.000000.png\n"); });
+  refuse("rgb.txt: time is NaN", "rgb.txt:1",
+         [](const fs::path& p) { Write(p / "rgb.txt", "nan rgb/0.000000.png\n"); });
+  refuse("rgb.txt: times fall", "rgb.txt:2", [](const fs::path& p) {
+    Write(p / "rgb.txt", "1.0 rgb/0.000000.png\n0.5 rgb/0.033333.png\n");
+  });
+  refuse("rgb.txt: line without a file", "rgb.txt:1",
+         [](const fs::path& p) { Write(p / "rgb.txt", "1.0\n"); });
+  refuse("rgb.txt: 4 KiB of zeros", "rgb.txt",
+         [](const fs::path& p) { Write(p / "rgb.txt", std::string(4096, '\0')); });
+}
+
+TEST_F(BadDataSet, CameraIsRefusedWithFieldAndRemedy) {
+  const auto refuse = [&](const std::string& input, const std::string& part,
+                          const std::string& text) {
+    ExpectRefusedStart("camera.yaml: " + input,
+                       Spoiled([&](const fs::path& p) { Write(p / "camera.yaml", text); }), 1,
+                       part);
+  };
+  ExpectRefusedStart("camera.yaml: missing",
+                     Spoiled([](const fs::path& p) { fs::remove(p / "camera.yaml"); }), 1,
+                     "camera.yaml");
+  refuse("not YAML", "camera.yaml", "{{{{");
+  refuse("unknown model", "model", Camera("fisheye9000"));
+  refuse("focal length NaN", "fx",
+         "model: pinhole\nwidth: 320\nheight: 240\nfx: .nan\nfy: 288\ncx: 160\ncy: 120\n");
+  refuse("width missing", "width",
+         "model: pinhole\nheight: 240\nfx: 288\nfy: 288\ncx: 160\ncy: 120\n");
+  refuse("width 0", "width",
+         "model: pinhole\nwidth: 0\nheight: 240\nfx: 288\nfy: 288\ncx: 160\ncy: 120\n");
+  refuse("three coefficients for five", "distortion",
+         Camera("brown_conrady", "distortion: [0.1, 0.2, 0.3]\n"));
+  refuse("infinite coefficient", "distortion",
+         Camera("brown_conrady", "distortion: [.inf, 0, 0, 0, 0]\n"));
+}
+
+TEST_F(BadDataSet, TargetIsRefused) {
+  ExpectRefusedStart("target.yaml: not YAML",
+                     Spoiled([](const fs::path& p) { Write(p / "target.yaml", "}{"); }), 1,
+                     "target.yaml");
+  ExpectRefusedStart("target.yaml: unknown type",
+                     Spoiled([](const fs::path& p) { Write(p / "target.yaml", "type: moon\n"); }),
+                     1, "target.yaml");
+}
+
+TEST_F(BadDataSet, BrokenPicturesAreSkippedCountedAndNamed) {
+  const std::vector<std::string> arguments = Spoiled([](const fs::path& p) {
+    fs::remove(p / "rgb" / "0.000000.png");
+    Write(p / "rgb" / "0.033333.png", "");
+    const auto third = p / "rgb" / "0.066667.png";
+    fs::resize_file(third, fs::file_size(third) / 2);
+    Write(p / "rgb" / "0.100000.png", std::string(5000, 'x'));
+  });
+  Server server(arguments);
+  std::string err;
+  for (int i = 0; i < 100 && err.find("0.100000") == std::string::npos; ++i) {
+    server.process().Wait(std::chrono::milliseconds(50));
+    err = server.process().err();
+  }
+  const RunResult status =
+      RunProgram({SACCADE_PROGRAM, "--server", server.grpc(), "status", "--json"});
+  const auto json = nlohmann::json::parse(status.out, nullptr, false);
+  const bool named = err.find("0.000000.png") != std::string::npos &&
+                     err.find("0.033333.png") != std::string::npos &&
+                     err.find("0.100000.png") != std::string::npos;
+  Row("start", "pictures: one missing, one of 0 bytes, one cut in half, one of rubbish",
+      "skipped and named on stderr; serves: " + std::string(IsWell(server) ? "yes" : "no"),
+      named && IsWell(server) && !json.is_discarded());
+}
+
+TEST_F(BadDataSet, PictureOfAnotherSizeIsSkipped) {
+  const std::vector<std::string> arguments = Spoiled([](const fs::path& p) {
+    const TemporaryFolder other;
+    WriteSmallDataset(other / "set", {.frames = 2, .width = 160, .height = 120});
+    fs::copy_file(other / "set/rgb/0.033333.png", p / "rgb" / "0.033333.png",
+                  fs::copy_options::overwrite_existing);
+  });
+  Server server(arguments);
+  std::string err;
+  for (int i = 0; i < 60 && err.find("0.033333") == std::string::npos; ++i) {
+    server.process().Wait(std::chrono::milliseconds(50));
+    err = server.process().err();
+  }
+  const auto at = err.find("0.033333");
+  const auto begin = at == std::string::npos ? 0 : err.rfind('\n', at) + 1;
+  Row("start", "picture of 160 x 120 in a data set of 320 x 240",
+      err.substr(begin, err.find('\n', at) - begin), at != std::string::npos && IsWell(server));
+}
+
+TEST(BadStart, ArgumentsAreRefusedByName) {
+  TemporaryFolder folder;
+  WriteSmallDataset(folder / "set", {.frames = 5});
+  const std::string source = "dataset:" + (folder / "set"), data = folder / "data";
+  const auto refuse = [&](const std::string& input, std::vector<std::string> arguments, int code,
+                          const std::string& part) {
+    arguments.insert(arguments.end(), {"--data-dir", data});
+    ExpectRefusedStart(input, arguments, code, part);
+  };
+  refuse("no --source", {}, 2, "source");
+  refuse("--source of an unknown kind", {"--source", "telepathy:1"}, 1, "telepathy");
+  refuse("unknown option", {"--source", source, "--frobnicate"}, 2, "frobnicate");
+  refuse("--grpc without a port", {"--source", source, "--grpc", "localhost"}, 2, "grpc");
+  refuse("another address without --insecure", {"--source", source, "--grpc", "0.0.0.0:0"}, 2,
+         "--insecure");
+  Write(folder / "broken.toml", "this is = = not TOML");
+  refuse("--config that is not TOML", {"--source", source, "--config", folder / "broken.toml"}, 2,
+         "broken.toml");
+  Write(folder / "unknown.toml", "colour_of_the_sky = 3\n");
+  refuse("--config with an unknown key", {"--source", source, "--config", folder / "unknown.toml"},
+         2, "colour_of_the_sky");
+}
+
+TEST(BadStart, DataFolderAndPortsAreRefusedByName) {
+  TemporaryFolder folder;
+  WriteSmallDataset(folder / "set", {.frames = 5});
+  const std::string source = "dataset:" + (folder / "set");
+  Write(folder / "file", "a file where a folder should be");
+  ExpectRefusedStart("--data-dir is a file", {"--source", source, "--data-dir", folder / "file"}, 1,
+                     "file");
+  {
+    Server first({"--source", source, "--data-dir", folder / "data"});
+    ExpectRefusedStart("--grpc port in use",
+                       {"--source", source, "--data-dir", folder / "other", "--grpc", first.grpc()},
+                       1, first.grpc().substr(first.grpc().rfind(':') + 1));
+    first.process().Signal(SIGTERM);
+    ASSERT_EQ(first.process().Wait(std::chrono::seconds(5)), 0);
+  }
+  for (const auto& entry : fs::directory_iterator(folder / "data")) {
+    if (entry.is_regular_file()) Write(entry.path(), std::string(8192, '\x5a'));
+  }
+  ExpectRefusedStart("data base overwritten with rubbish",
+                     {"--source", source, "--data-dir", folder / "data"}, 1, "data");
+}
+
+}  // namespace
+}  // namespace saccade::testing
