@@ -14,7 +14,6 @@ export class Frustum {
   private readonly lines: THREE.LineSegments;
   private readonly texture: THREE.CanvasTexture;
   private camera: Camera | undefined;
-  private depthM = 0;
 
   constructor(source: HTMLCanvasElement) {
     this.texture = new THREE.CanvasTexture(source);
@@ -34,8 +33,8 @@ export class Frustum {
   }
 
   /** Shows the picture now in the source canvas at the pose it was taken from. */
-  show(camera: Camera, worldFromCamera: Rigid3, depthM: number): void {
-    if (camera !== this.camera || depthM !== this.depthM) this.build(camera, depthM);
+  show(camera: Camera, worldFromCamera: Rigid3): void {
+    if (camera !== this.camera) this.build(camera);
     const p = threeFromWorld(worldFromCamera.translation);
     const q = threeOrientation(worldFromCamera);
     this.object.position.set(p.x, p.y, p.z);
@@ -44,13 +43,18 @@ export class Frustum {
     this.object.visible = true;
   }
 
+  /** How far the picture lies before the eye [m]: to suit how near one looks. */
+  resize(depthM: number): void {
+    this.object.scale.setScalar(depthM);
+  }
+
   hide(): void {
     this.object.visible = false;
   }
 
-  private build(camera: Camera, depthM: number): void {
+  /** With the picture 1 m before the eye. */
+  private build(camera: Camera): void {
     this.camera = camera;
-    this.depthM = depthM;
     this.texture.dispose(); // the canvas may have changed its size
     const { width, height } = camera.intrinsics;
     const positions: number[] = [];
@@ -59,7 +63,7 @@ export class Frustum {
       const u = (column / COLUMNS) * width - 0.5;
       const v = (row / ROWS) * height - 0.5;
       const ray = camera.unproject({ u, v }) ?? { x: 0, y: 0, z: 1 };
-      return threeFromWorld(scale(ray, depthM / Math.max(ray.z, 0.2)));
+      return threeFromWorld(scale(ray, 1 / Math.max(ray.z, 0.2)));
     };
     for (let row = 0; row <= ROWS; ++row) {
       for (let column = 0; column <= COLUMNS; ++column) {

@@ -12,6 +12,7 @@ import { OrbitCamera } from './orbit';
 import { PathLine } from './path_line';
 
 const FIELD_OF_VIEW_DEG = 45;
+const FRUSTUM_SHARE = 0.14; // of the distance looked from: the live picture keeps its size
 
 /** True without a graphics card, where smooth edges would cost more than the rest together. */
 function drawsInSoftware(): boolean {
@@ -111,6 +112,7 @@ export class MapView {
     if (this.orbit.step(elapsed)) this.dirty = true;
     if (!this.dirty || this.width === 0) return false;
     this.dirty = false;
+    this.frustum.resize(this.orbit.distance * FRUSTUM_SHARE);
     const pose = this.orbit.worldFromCamera();
     const p = threeFromWorld(pose.translation);
     const q = threeOrientation(pose);
@@ -134,8 +136,7 @@ export class MapView {
       this.shownFrame = -1;
     } else if (shown.frameId !== this.shownFrame) {
       this.shownFrame = shown.frameId;
-      const depth = this.framed ? this.framed.radius * 0.3 : 0.2;
-      this.frustum.show(shown.camera, shown.worldFromCamera, depth);
+      this.frustum.show(shown.camera, shown.worldFromCamera);
       this.dirty = true;
     }
   }

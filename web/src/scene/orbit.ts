@@ -73,8 +73,9 @@ export class OrbitCamera {
     this.goal = { ...this.goal, target };
   }
 
-  get target(): Vec3 {
-    return this.goal.target;
+  /** From the eye to what it looks at [m]. */
+  get distance(): number {
+    return this.now.distance;
   }
 
   /** Of the eye: x right, y down, z forward. */

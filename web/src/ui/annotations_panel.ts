@@ -7,6 +7,8 @@ import { anchorWords } from './words';
 
 export interface AnnotationActions {
   select(id: string): void;
+  /** Shows which mark a row means; undefined: none. */
+  point(id: string | undefined): void;
   remove(id: string): void;
   /** Empty `text` keeps the note as it is. */
   finishEditing(id: string, text: string | undefined): void;
@@ -17,6 +19,7 @@ interface Row {
   readonly element: HTMLElement;
   readonly title: HTMLElement;
   readonly state: HTMLElement;
+  readonly by: HTMLElement;
   readonly button: HTMLElement;
   editor: HTMLFormElement | undefined;
 }
@@ -67,6 +70,8 @@ export class AnnotationsPanel {
     const refusal = this.state.refusal(`annotation ${annotation.id}`);
     setText(row.title, annotation.text || annotation.shape);
     setText(row.state, refusal ?? words.text);
+    const provisional = annotation.anchor.state === 'provisional';
+    setText(row.by, provisional ? 'provisional' : annotation.author);
     setClass(row.element, 'warn', words.warn || refusal !== undefined);
     if (selected && !row.element.classList.contains('selected')) {
       row.element.scrollIntoView({ block: 'nearest' });
@@ -80,7 +85,7 @@ export class AnnotationsPanel {
     const { id, shape, author } = annotation;
     const title = h('span', { class: 'title' });
     const state = h('span', { class: 'state number' });
-    const by = h('span', { class: 'by' }, author);
+    const by = h('span', { class: 'by' });
     const button = h(
       'button',
       { class: 'pick', type: 'button', title: `${shape} by ${author}` },
@@ -94,8 +99,10 @@ export class AnnotationsPanel {
     remove.append(icon('M5.5 5.5l9 9M14.5 5.5l-9 9'));
     remove.addEventListener('click', () => this.actions.remove(id));
     const element = h('li', { 'data-id': id, 'data-shape': shape }, button, remove);
+    element.addEventListener('pointerenter', () => this.actions.point(id));
+    element.addEventListener('pointerleave', () => this.actions.point(undefined));
     this.list.append(element);
-    const row: Row = { element, title, state, button, editor: undefined };
+    const row: Row = { element, title, state, by, button, editor: undefined };
     this.rows.set(id, row);
     return row;
   }

@@ -83,6 +83,11 @@ export class Controller implements ToolActions, AnnotationActions {
     this.state.changed();
   }
 
+  point(id: string | undefined): void {
+    this.state.pointedId = id;
+    this.state.changed();
+  }
+
   remove(id: string): void {
     if (this.state.selectedId === id) this.state.selectedId = undefined;
     this.attempt(`annotation ${id}`, () => this.edits.remove(id));

@@ -92,7 +92,11 @@ export class MapPane {
   private drawMarks(view: View, width: number, height: number): void {
     this.painter.begin({ width, height }, { left: 0, top: 0, scale: 1 });
     this.painter.axes(axisStrokes(view));
-    this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), this.state.selectedId);
+    const { selectedId, pointedId } = this.state;
+    this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), [
+      selectedId,
+      pointedId,
+    ]);
     const { hover } = this.state;
     if (hover?.pane === 'map' && hover.landing) {
       const at = projectPoint(view, hover.landing.pointInWorld);

@@ -78,9 +78,9 @@ export class Painter {
     this.context.stroke();
   }
 
-  /** Light lines with a dark halo; the selected mark in the accent colour, a hollow one dashed. */
-  marks({ strokes, labels }: Marks, selectedId: string | undefined): void {
-    const chosen = (id: string): boolean => id !== '' && id === selectedId;
+  /** Light lines with a dark halo; accented ones in that colour, a hollow one dashed. */
+  marks({ strokes, labels }: Marks, accented: readonly (string | undefined)[]): void {
+    const chosen = (id: string): boolean => id !== '' && accented.includes(id);
     for (const { points } of strokes) {
       this.trace(points);
       this.stroke(HALO, 5);

@@ -89,7 +89,11 @@ export class VideoPane {
     if (!view) return;
     this.drawFeatures(facts, view);
     this.painter.axes(axisStrokes(view));
-    this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), this.state.selectedId);
+    const { selectedId, pointedId } = this.state;
+    this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), [
+      selectedId,
+      pointedId,
+    ]);
     const { hover } = this.state;
     if (hover?.pane !== 'video' || !hover.landing) return;
     const { landing, pixel } = hover;

@@ -108,8 +108,7 @@ export function anchorWords(
   if (!anchor.pointInWorld) return { text: 'place not known', warn: true };
   const px = anchor.errorPx === undefined ? 'out of view' : `${anchor.errorPx.toFixed(1)} px`;
   const size = metric ? ` · ${millimetres(anchor.errorMm)}` : ' · scale unknown';
-  const provisional = anchor.state === 'provisional' ? 'provisional · ' : '';
-  return { text: `${provisional}${px}${size}`, warn: false };
+  return { text: `${px}${size}`, warn: false };
 }
 
 function millimetres(mm: number): string {
