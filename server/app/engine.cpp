@@ -30,6 +30,7 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source,
       source_(std::move(source)),
       tracker_(std::move(tracker)),
       inbox_(options_.mailbox),
+      clock_(/*paced=*/!options_.every_frame),
       stills_({.capacity = kStillsWaiting, .when_full = WhenFull::kRefuse},
               [this](StillRequest request) { MakeStill(std::move(request)); }) {
   views_[static_cast<std::size_t>(VideoView::kRaw)] = std::make_unique<ViewEncoder>(
@@ -146,12 +147,14 @@ void Engine::Track(Frame frame) {
 void Engine::Settle() {
   if (!last_) return;
   book_->OnSnapshot(last_->tracked.snapshot, *last_->tracked.camera);
-  const bool changed = last_->tracked.annotations != book_->Latest();
-  if (changed) Publish();
+  const bool same = last_->tracked.annotations == book_->Latest() &&
+                    last_->tracked.snapshot == published_snapshot_;
+  if (!same) Publish();
 }
 
 void Engine::Publish() {
   last_->tracked.annotations = book_->Latest();
+  published_snapshot_ = last_->tracked.snapshot;
   sink_.OnTracked(last_->tracked);
   for (const auto& view : views_) view->Post(*last_);
 }

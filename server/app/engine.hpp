@@ -100,6 +100,7 @@ class Engine : public Backend {
   // Tracker thread.
   FrameClock clock_;
   std::optional<TrackedFrame> last_;
+  std::shared_ptr<const MapSnapshot> published_snapshot_;
 
   RollingStatistics captured_, track_ms_;
   std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, bad_frames_ = 0;

@@ -10,11 +10,15 @@ namespace saccade {
 
 /// Brings capture times to the monotonic clock. Live sources are on it already; a recording has a
 /// clock of its own, and its frames count as captured at the latest possible moments that keep
-/// their distances and lie before their arrival.
+/// their distances and lie before their arrival. A source that does not keep pace with any clock
+/// (`paced` false: every frame as fast as it can) is captured when it arrives.
 class FrameClock {
  public:
+  explicit FrameClock(bool paced = true) : paced_(paced) {}
+
   /// `received_ns`: MonotonicNow() when the picture was complete.
   Timestamp ToMonotonic(Timestamp capture_ns, Timestamp received_ns) {
+    if (!paced_) return received_ns;
     const Timestamp difference = received_ns - capture_ns;
     if (!offset_ns_) {
       const bool live = difference >= 0 && difference < kLiveNs;
@@ -27,6 +31,7 @@ class FrameClock {
 
  private:
   static constexpr Timestamp kLiveNs = 1'000'000'000;
+  const bool paced_;
   std::optional<Timestamp> offset_ns_;
   bool adapts_ = false;
 };

@@ -22,5 +22,11 @@ TEST(FrameClock, ARecordingKeepsItsDistancesAndNeverComesFromTheFuture) {
   EXPECT_EQ(clock.ToMonotonic(recorded + 66 * kMs, 171 * kMs), 166 * kMs);
 }
 
+TEST(FrameClock, WithoutPaceAFrameIsCapturedWhenItArrives) {
+  FrameClock clock(/*paced=*/false);
+  EXPECT_EQ(clock.ToMonotonic(33 * kMs, 9'000 * kMs), 9'000 * kMs);
+  EXPECT_EQ(clock.ToMonotonic(66 * kMs, 9'500 * kMs), 9'500 * kMs);
+}
+
 }  // namespace
 }  // namespace saccade
