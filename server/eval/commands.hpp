@@ -34,12 +34,18 @@ struct SimArguments {
   TrackerArguments tracker;
   bool json = false;
 };
+struct RenderArguments {
+  std::string source, frames;  // sim:desk?..., A:B
+  std::filesystem::path out;
+};
 
 /// The subcommands of saccade-eval (architecture section 4). Results go to stdout, errors come
 /// back.
 absl::Status RunCommand(const RunArguments& arguments);
 absl::Status ScoreCommand(const ScoreArguments& arguments);
 absl::Status SimCommand(const SimArguments& arguments);
+/// Writes frames of a simulated source as the lens saw them, without noise: DIR/000123.png.
+absl::Status RenderCommand(const RenderArguments& arguments);
 
 /// Scenarios that SimCommand knows, for people: "points, desk, ...".
 std::string ScenarioNames();

@@ -64,6 +64,13 @@ void AddSim(CLI::App& app, SimArguments& arguments) {
   sim->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
 }
 
+void AddRender(CLI::App& app, RenderArguments& arguments) {
+  CLI::App* render = app.add_subcommand("render", "Write frames of the simulator, without noise");
+  render->add_option("--source", arguments.source, "sim:desk[?key=value&...]")->required();
+  render->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
+  render->add_option("--out", arguments.out, "Folder for 000000.png ...")->required();
+}
+
 int Main(int argc, char** argv) {
   cv::setNumThreads(1);  // results must not depend on the machine's cores
   CLI::App app("Saccade's evaluation: runs on recordings, scores, simulation", "saccade-eval");
@@ -75,9 +82,11 @@ int Main(int argc, char** argv) {
   RunArguments run;
   ScoreArguments score;
   SimArguments sim;
+  RenderArguments render;
   AddRun(app, run);
   AddScore(app, score);
   AddSim(app, sim);
+  AddRender(app, render);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -87,6 +96,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("run")) status = RunCommand(run);
   if (app.got_subcommand("score")) status = ScoreCommand(score);
   if (app.got_subcommand("sim")) status = SimCommand(sim);
+  if (app.got_subcommand("render")) status = RenderCommand(render);
   return status.ok() ? 0 : Fail(status);
 }
 
