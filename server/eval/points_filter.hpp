@@ -41,7 +41,8 @@ class PointsFilter {
 
  private:
   std::vector<Observation> Match(const PointsFrame& frame) const;
-  /// Where the tracker would linearise: the robust pose of these matches.
+  /// Where the tracker would linearise: the robust pose of these matches. All of them are used
+  /// afterwards, whatever their weight: associations are known here, so there are no outliers.
   Rigid3 LinearisationPose(const std::vector<Observation>& matches);
   absl::Status Birth(const PointsFrame& frame, std::size_t matched);
   bool IsKnown(int point) const;
