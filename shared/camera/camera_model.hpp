@@ -12,7 +12,8 @@ enum class LensModel { kPinhole, kRadial1, kBrownConrady, kKannalaBrandt };
 /// Intrinsics of one camera. Pixel (0, 0) is the centre of the top-left pixel.
 ///
 /// `distortion` by model: radial1 {k1 [px^-2]}, with u_d = u / sqrt(1 + 2 k1 |u|^2) in pixels from
-/// (cx, cy); brown_conrady {k1 k2 p1 p2 k3} (OpenCV order); kannala_brandt {k1 k2 k3 k4}; pinhole none.
+/// (cx, cy); brown_conrady {k1 k2 p1 p2 k3} (OpenCV order); kannala_brandt {k1 k2 k3 k4}; pinhole
+/// none.
 struct CameraIntrinsics {
   LensModel model = LensModel::kPinhole;
   int width = 0;
@@ -23,7 +24,8 @@ struct CameraIntrinsics {
   double rolling_shutter_readout_s = 0.0;  // 0: global shutter or unknown
 };
 
-/// Maps points in the camera frame (x right, y down, z forward, metres) to distorted pixels and back.
+/// Maps points in the camera frame (x right, y down, z forward, metres) to distorted pixels and
+/// back.
 class CameraModel {
  public:
   CameraModel() = default;
@@ -45,8 +47,7 @@ class CameraModel {
   /// `d_bearing_d_pixel`, if given, receives the 3 x 2 Jacobian [1/px].
   /// Accurate to 1e-6 px when projected again (T10).
   std::optional<Eigen::Vector3d> Unproject(
-      const Eigen::Vector2d& pixel,
-      Eigen::Matrix<double, 3, 2>* d_bearing_d_pixel = nullptr) const;
+      const Eigen::Vector2d& pixel, Eigen::Matrix<double, 3, 2>* d_bearing_d_pixel = nullptr) const;
 
   /// True if `pixel` is at least `border_px` inside the image.
   bool InImage(const Eigen::Vector2d& pixel, double border_px = 0.0) const {

@@ -19,7 +19,7 @@ enum class AnchorState { kProvisional, kTracking, kPaused, kStopped };
 
 /// Where the expert clicked. Exactly one.
 struct PixelTarget {
-  FrameId frame_id = 0;  // the frame whose picture the expert saw
+  FrameId frame_id = 0;                             // the frame whose picture the expert saw
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw picture, full resolution, distorted [px]
 };
 struct FeatureTarget {
@@ -29,7 +29,7 @@ struct PointTarget {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
 };
 struct RayTarget {
-  Eigen::Vector3d origin_in_world = Eigen::Vector3d::Zero();     // [m]
+  Eigen::Vector3d origin_in_world = Eigen::Vector3d::Zero();      // [m]
   Eigen::Vector3d direction_in_world = Eigen::Vector3d::UnitZ();  // any length > 0
 };
 using AnnotationTarget = std::variant<PixelTarget, FeatureTarget, PointTarget, RayTarget>;
@@ -91,7 +91,7 @@ struct AnnotationPatch {
 struct AnchorMoved {
   std::string id;
   Eigen::Vector3d delta_in_world = Eigen::Vector3d::Zero();  // [m]
-  std::string cause;                                         // "map corrected", "moved by its author"
+  std::string cause;  // "map corrected", "moved by its author"
 };
 
 }  // namespace saccade

@@ -28,8 +28,8 @@ enum class FeatureState { kNotAttempted, kMeasured, kFailed };
 struct FeatureSnapshot {
   FeatureId id = 0;
   FeatureState state = FeatureState::kNotAttempted;
-  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
-  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // marginal [m^2]
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();       // [m]
+  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  // marginal [m^2]
   /// Of the point expressed in the camera frame, cross terms with the camera pose included [m^2]:
   /// what matters for the error in the picture.
   Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();

@@ -5,7 +5,8 @@
 
 namespace saccade {
 
-/// Nanoseconds on the capture clock (monotonic). Stamped at mid-exposure, carried to the last pixel.
+/// Nanoseconds on the capture clock (monotonic). Stamped at mid-exposure, carried to the last
+/// pixel.
 using Timestamp = std::int64_t;
 
 /// Now on the clock that live sources stamp with: std::chrono::steady_clock.

@@ -22,7 +22,7 @@ class ParserFuzz : public DatasetFixture {
           "nan", "-1e999", "[",  "]",         "{",
           "}",   ":",      "- ", "\n",        "\t",
           "#",   "&a",     "*a", "!!binary ", "99999999999999999999",
-          "0x",  "'",      "\"",       "?"};
+          "0x",  "'",      "\"", "?"};
       switch (rng_() % 5) {
         case 0:
           text[at] = static_cast<char>(rng_());
