@@ -123,7 +123,8 @@ export class Painter {
     const { context, ratio } = this;
     const x = this.x(at);
     const y = this.y(at);
-    const r = 3.5 * ratio;
+    // Smaller on a small picture, where they lie closer together.
+    const r = 3.5 * ratio * Math.min(Math.max(this.scale / ratio, 0.6), 1.1);
     context.beginPath();
     if (state === 'failed') {
       context.moveTo(x - r, y - r);

@@ -65,6 +65,11 @@ export class WearerApp {
     const { link, pose, sourceEnded } = session;
     const words = statusWords({ link, pose, sourceEnded, nowMs: pageNowMs() });
     const text = [words.text, words.advice].filter(Boolean).join(': ');
+    const age = player.shown ? pageNowMs() - player.shown.drawnMs : 0;
+    const stale = age > STALE_MS && !paused && !sourceEnded;
+    // While the picture is live it has its status burned in: one line is enough.
+    const burnedIn = link.kind === 'live' && player.shown && !paused && !stale && !sourceEnded;
+    setClass(this.line, 'hidden', burnedIn === true);
     setText(this.mark, paused ? 'Ⅱ' : words.mark);
     // Nothing reaches the camera from here yet: say what a pause is, and what it is not.
     setText(this.words, paused ? 'picture held here; experts still see the camera' : text);
@@ -72,8 +77,6 @@ export class WearerApp {
     setText(this.watchers, session.live ? watcherWords(session) : '');
     setText(this.pauseButton, paused ? '▶ Go on' : 'Ⅱ Pause picture');
     setText(this.fullButton, document.fullscreenElement ? 'Leave full screen' : 'Full screen');
-    const age = player.shown ? pageNowMs() - player.shown.drawnMs : 0;
-    const stale = age > STALE_MS && !paused && !sourceEnded;
     setText(this.notice, noticeWords(player, stale ? age : 0));
     setClass(this.element, 'stale', stale);
   }

@@ -1,5 +1,5 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
-// usage: run.mjs [--server PATH] [--chromium PATH] [--seed N] [--shots DIR]
+// usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -11,6 +11,7 @@ const web = join(dirname(fileURLToPath(import.meta.url)), '..', '..');
 const { values: options } = parseArgs({
   options: {
     server: { type: 'string', default: join(web, '../build/release/bin/saccade-server') },
+    evaluator: { type: 'string', default: join(web, '../build/release/bin/saccade-eval') },
     chromium: { type: 'string', default: '/usr/bin/chromium' },
     seed: { type: 'string', default: '1' },
     shots: { type: 'string' },
@@ -20,6 +21,7 @@ const { values: options } = parseArgs({
 // 77 is CTest's "skipped".
 const needed = {
   [options.server]: 'build saccade-server',
+  [options.evaluator]: 'build saccade-eval',
   [options.chromium]: 'install chromium',
   [join(web, 'dist/index.html')]: 'run npm run build in web/',
   [join(web, 'node_modules/playwright-core')]: 'run npm ci in web/',

@@ -1,6 +1,9 @@
 // The real saccade-server as a child process, and what its simulator says is true.
-import { spawn } from 'node:child_process';
-import { closeSync, openSync, readSync } from 'node:fs';
+import { execFile, spawn } from 'node:child_process';
+import { closeSync, openSync, readFileSync, readSync } from 'node:fs';
+import { join } from 'node:path';
+import { promisify } from 'node:util';
+import { decodePng } from './pictures.mjs';
 
 /** Starts a server; resolves when it serves. `http` is its page's address. */
 export async function startServer(binary, args) {
@@ -73,4 +76,19 @@ export class Truth {
       }
     }
   }
+}
+
+/** The simulator's frame `id` as it is without noise, drawn by saccade-eval. */
+export async function renderTruth(evaluator, source, id, out) {
+  const range = `${id}:${id + 1}`;
+  await promisify(execFile)(evaluator, [
+    'render',
+    '--source',
+    source,
+    '--frames',
+    range,
+    '--out',
+    out,
+  ]);
+  return decodePng(readFileSync(join(out, `${String(id).padStart(6, '0')}.png`)));
 }
