@@ -67,35 +67,43 @@ void StreamHub::Distribute(const Message& message) {
 }
 
 void StreamHub::Add(const std::shared_ptr<Subscriber>& subscriber) {
+  const auto offer_state = [&] {
+    const std::optional<TrackedEvent> tracked = newest();
+    const std::optional<std::uint64_t> end = end_of_source();
+    const std::shared_ptr<const v1::PresenceEvent> present = presence();
+    subscriber->Update([&](Subscription& subscription) {
+      if (tracked) subscription.Offer(*tracked);
+      if (end) subscription.OfferEnd(*end);
+      subscription.OfferPresence(present);
+    });
+  };
+  // Before the hub's thread knows of it: the first events are the whole state. And once more after,
+  // for what happened in between.
+  offer_state();
   std::shared_ptr<Subscriber> replaced;
-  bool closed = false;
-  {
-    const std::lock_guard lock(mutex_);
-    closed = closed_;
-    if (!closed_) {
-      const auto same = std::find_if(streams_.begin(), streams_.end(), [&](const auto& other) {
-        return other->session().id == subscriber->session().id;
-      });
-      if (same != streams_.end()) {
-        replaced = *same;
-        streams_.erase(same);
-      }
-      streams_.push_back(subscriber);
-    }
+  if (!Insert(subscriber, replaced)) {
+    return subscriber->Close(absl::UnavailableError("the server is shutting down"));
   }
   if (replaced != nullptr) {
     replaced->Close(absl::AbortedError("session_id: this session opened another stream"));
   }
-  if (closed) return subscriber->Close(absl::UnavailableError("the server is shutting down"));
-  const std::optional<TrackedEvent> tracked = newest();
-  const std::optional<std::uint64_t> end = end_of_source();
   StreamsChanged();
-  const std::shared_ptr<const v1::PresenceEvent> present = presence();
-  subscriber->Update([&](Subscription& subscription) {
-    if (tracked) subscription.Offer(*tracked);
-    if (end) subscription.OfferEnd(*end);
-    subscription.OfferPresence(present);
+  offer_state();
+}
+
+bool StreamHub::Insert(const std::shared_ptr<Subscriber>& subscriber,
+                       std::shared_ptr<Subscriber>& replaced) {
+  const std::lock_guard lock(mutex_);
+  if (closed_) return false;
+  const auto same = std::find_if(streams_.begin(), streams_.end(), [&](const auto& other) {
+    return other->session().id == subscriber->session().id;
   });
+  if (same != streams_.end()) {
+    replaced = *same;
+    streams_.erase(same);
+  }
+  streams_.push_back(subscriber);
+  return true;
 }
 
 void StreamHub::Remove(const Subscriber* subscriber) {

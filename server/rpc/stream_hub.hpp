@@ -91,6 +91,8 @@ class StreamHub : public EventSink {
                                EndOfSource, PresenceChanged>;
 
   void Distribute(const Message& message);
+  /// False: closed. `replaced` is the stream that the same session had.
+  bool Insert(const std::shared_ptr<Subscriber>& subscriber, std::shared_ptr<Subscriber>& replaced);
   std::vector<std::shared_ptr<Subscriber>> Streams() const;
   void StreamsChanged();
 

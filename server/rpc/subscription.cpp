@@ -76,6 +76,8 @@ void Subscription::Offer(const std::shared_ptr<const VideoPacket>& packet) {
 void Subscription::Offer(const EngineStatistics& statistics) { statistics_ = statistics; }
 
 void Subscription::OfferPresence(std::shared_ptr<const v1::PresenceEvent> presence) {
+  if (presence == presence_seen_) return;
+  presence_seen_ = presence;
   presence_ = std::move(presence);
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "saccade/v1/session.pb.h"
@@ -39,7 +40,9 @@ class Subscription {
   void Offer(const std::shared_ptr<const VideoPacket>& packet);
   void Offer(const EngineStatistics& statistics);
   void OfferPresence(std::shared_ptr<const v1::PresenceEvent> presence);
-  void OfferEnd(std::uint64_t frames) { end_frames_ = frames; }
+  void OfferEnd(std::uint64_t frames) {
+    if (!std::exchange(end_seen_, true)) end_frames_ = frames;
+  }
 
   /// InvalidArgument: `sequence` was never sent.
   absl::Status Acknowledge(std::uint64_t sequence, bool request_key_frame);
@@ -76,9 +79,10 @@ class Subscription {
   MapDeltaTracker map_;
   AnnotationDeltaTracker annotations_;
   VideoQueue video_;
-  std::shared_ptr<const v1::PresenceEvent> presence_;
+  std::shared_ptr<const v1::PresenceEvent> presence_, presence_seen_;
   std::optional<EngineStatistics> statistics_;
   std::optional<std::uint64_t> end_frames_;
+  bool end_seen_ = false;
   std::uint64_t poses_skipped_ = 0;
 };
 
