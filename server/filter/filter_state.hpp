@@ -42,6 +42,7 @@ struct PredictedPixel {
   Eigen::Matrix2d covariance;  // H P H^T [px^2], without measurement noise
   /// Cov(H error, camera pose error) [position, rotation].
   Eigen::Matrix<double, 2, 6> with_camera;
+  double inverse_range_variance = 0.0;  // marginal [1/m^2]; 0: known point
 };
 
 struct FeatureMarginal {
@@ -116,13 +117,17 @@ class FilterState {
   /// Corrects everything with the observations of one frame (joint update, slam-spec 2).
   ///
   /// n = dim(), m = 2 * observations.size(): O(n^2 m). Measurements are linearised at
-  /// `linearisation`, which may be a better pose than the predicted one (iterated update with that
-  /// as its only iterate). Uses the information form when m > n. On error nothing changes:
+  /// `linearisation`, which may be a better pose than the predicted one; with more `iterations`,
+  /// then again where the correction leads (iterated update: worth it while depths are unknown).
+  /// `pose_covariance`, if given, is how well `linearisation` is known: a baseline that does not
+  /// stand out from it then says nothing of depth (README: depth from noise).
+  /// Uses the information form when m > n. On error nothing changes:
   ///   InvalidArgument     unknown feature, or one not in view from `linearisation`
   ///   FailedPrecondition  innovation covariance not positive definite
   absl::StatusOr<UpdateReport> Update(const CameraModel& camera,
                                       std::span<const Observation> observations,
-                                      const Rigid3& linearisation);
+                                      const Rigid3& linearisation, int iterations = 1,
+                                      const Matrix6d* pose_covariance = nullptr);
 
   /// Removes features whose inverse range is negative by two sigma; returns them.
   std::vector<FeatureId> RemoveBehind();
@@ -156,10 +161,21 @@ class FilterState {
   void RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size);
   absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
                                           std::span<const Observation> observations,
-                                          const Rigid3& linearisation) const;
-  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report);
+                                          const Rigid3& linearisation, const Eigen::VectorXd& ahead,
+                                          const Matrix6d* pose_covariance) const;
+  /// Variance per axis of the camera's position relative to an anchor [m^2].
+  double BaselineVariance(int anchor_offset, const Matrix6d& pose_covariance,
+                          const Eigen::LLT<Matrix6d>& prior) const;
+  /// `final`: also correct the covariance.
+  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, bool final,
+                                             UpdateReport& report);
+  absl::Status Undo(const std::vector<Feature>& before, const absl::Status& status);
+  void MoveFeatures(const Eigen::VectorXd& step);
   absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report);
   void Correct(const Eigen::VectorXd& error);
+  /// Carries the covariance along when estimates move by `step`: a scale error then moves them by
+  /// what they are now, not by what they were (README: scale).
+  void CarryScale(const Eigen::VectorXd& step);
 
   FilterOptions options_;
   CameraMotion camera_;

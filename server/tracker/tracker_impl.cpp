@@ -10,8 +10,10 @@ namespace {
 constexpr int kSettledFeatures = 12;    // with known depth, before poses are published
 constexpr int kLongestSettling = 15;    // frames: under pure rotation depth never settles
 constexpr double kSettledDepth = 0.25;  // sigma / inverse range
-constexpr int kFewestToUpdate = 3;      // matches: fewer can agree by chance
-constexpr double kSurprise = 3.0;       // times the motion noise, after an unexpected move
+constexpr int kYoung = 60;              // frames: depths are unknown, updates iterate
+constexpr int kYoungIterations = 3;
+constexpr int kFewestToUpdate = 3;  // matches: fewer can agree by chance
+constexpr double kSurprise = 3.0;   // times the motion noise, after an unexpected move
 
 class StopWatch {
  public:
@@ -156,7 +158,9 @@ void Tracker::Impl::Correct(const CameraModel& camera) {
       observation.noise = match.noise / match.weight;  // soft gate
       observations.push_back(observation);
     }
-    const auto report = filter_.Update(camera, observations, matches_.pose.world_from_camera);
+    const auto report =
+        filter_.Update(camera, observations, matches_.pose.world_from_camera,
+                       frames_ < kYoung ? kYoungIterations : 1, &matches_.pose.covariance);
     if (!report.ok()) matches_.accepted = 0;
   }
   times_.update_ms = watch.Lap_ms();
