@@ -3,6 +3,7 @@
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <utility>
 #include <vector>
 
@@ -44,6 +45,7 @@ class GenericCall final : public UpstreamCall,
     StartWriteLast(&request_, grpc::WriteOptions());
     reading_ = true;
     StartRead(&response_);
+    handed_over_.store(true, std::memory_order_release);
     StartCall();
   }
 
@@ -62,10 +64,12 @@ class GenericCall final : public UpstreamCall,
  private:
   // From here to OnDone: gRPC's threads.
   void OnReadDone(bool ok) override {
+    (void)handed_over_.load(std::memory_order_acquire);
     post_([this, ok] { Received(ok); });
   }
 
   void OnDone(const grpc::Status& status) override {
+    (void)handed_over_.load(std::memory_order_acquire);
     CallResult result{
         static_cast<int>(status.error_code()), status.error_message(), status.error_details(), {}};
     for (const auto& [name, value] : context_.GetServerTrailingMetadata()) {
@@ -106,6 +110,9 @@ class GenericCall final : public UpstreamCall,
   bool reading_ = false;
   bool held_ = true;
   bool cancelled_ = false;
+  // gRPC's own locks order its callbacks after StartCall; this says so where they cannot be seen,
+  // to a thread sanitizer beside an uninstrumented gRPC.
+  std::atomic<bool> handed_over_ = false;
   std::shared_ptr<GenericCall> self_;  // until OnDone: gRPC holds a bare pointer
 };
 

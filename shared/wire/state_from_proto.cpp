@@ -240,6 +240,7 @@ absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string
   if (!state.ok()) return state.status();
   out.anchor.state = *state;
   out.anchor.method = AnchorMethodFromProto(anchor.method());
+  out.anchor.place_known = anchor.has_point_in_world_m();
   absl::StatusOr<Eigen::Vector3d> point =
       FromProto(anchor.point_in_world_m(), absl::StrCat(field, ".anchor.point_in_world_m"));
   if (!point.ok()) return point.status();

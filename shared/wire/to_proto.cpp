@@ -227,7 +227,9 @@ v1::Annotation ToProto(const Annotation& annotation) {
   v1::Anchor& anchor = *message.mutable_anchor();
   anchor.set_state(ToProto(annotation.anchor.state));
   anchor.set_method(ToProto(annotation.anchor.method));
-  *anchor.mutable_point_in_world_m() = ToProto(annotation.anchor.point_in_world);
+  if (annotation.anchor.place_known) {
+    *anchor.mutable_point_in_world_m() = ToProto(annotation.anchor.point_in_world);
+  }
   *anchor.mutable_covariance_in_world_m2() = ToProto(annotation.anchor.covariance_in_world);
   anchor.set_error_mm(annotation.anchor.error_m * 1e3);
   if (annotation.anchor.error_px) anchor.set_error_px(*annotation.anchor.error_px);
