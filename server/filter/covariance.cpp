@@ -64,13 +64,6 @@ void Covariance::TransformBlock(int offset, const Eigen::Ref<const Eigen::Matrix
   p_.block(offset, offset, size, size) = block * diagonal * block.transpose();
 }
 
-void Covariance::TransformRankOne(const Eigen::VectorXd& d, const Eigen::VectorXd& w) {
-  auto p = p_.topLeftCorner(n_, n_).selfadjointView<Eigen::Lower>();
-  Eigen::VectorXd u = p * w;
-  u += 0.5 * w.dot(u) * d;
-  p.rankUpdate(d, u, 1.0);
-}
-
 void Covariance::ReplaceBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& diagonal_block) {
   const int size = static_cast<int>(diagonal_block.rows());
   p_.block(offset, 0, size, offset).setZero();

@@ -28,8 +28,6 @@ class Covariance {
   void Downdate(const Eigen::Ref<const Eigen::MatrixXd>& w);
   /// P <- T P T^T where T is the identity but for the square `block` on the diagonal at `offset`.
   void TransformBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& block);
-  /// P <- T P T^T with T = I + d w^T (both n).
-  void TransformRankOne(const Eigen::VectorXd& d, const Eigen::VectorXd& w);
   /// Zeroes rows and columns [offset, offset + size) and puts `diagonal_block` there.
   void ReplaceBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& diagonal_block);
   /// Adds a symmetric block on the diagonal at `offset`.

@@ -20,6 +20,13 @@ void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance)
   anchors_.clear();
   features_.clear();
   covariance_.Assign(covariance);
+  readout_s_ = options_.readout_s;
+  readout_offset_ = -1;
+  if (options_.readout_sigma_s > 0.0) {
+    readout_offset_ = covariance_.Append(1);
+    covariance_.lower(readout_offset_, readout_offset_) =
+        options_.readout_sigma_s * options_.readout_sigma_s;
+  }
 }
 
 void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covariance) {

@@ -34,6 +34,8 @@ struct Observation {
   std::optional<Eigen::Vector3d> known_point;  // [m, world]; then `id` is not looked at
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();  // R [px^2]
+  /// d pixel / d read-out time [px/s]; `pixel` is corrected with the filter's present read-out.
+  Eigen::Vector2d d_readout = Eigen::Vector2d::Zero();
 };
 
 /// What a prediction's errors look like: z - h = -noise, split by where it comes from.
@@ -42,7 +44,6 @@ struct PredictedPixel {
   Eigen::Matrix2d covariance;  // H P H^T [px^2], without measurement noise
   /// Cov(H error, camera pose error) [position, rotation].
   Eigen::Matrix<double, 2, 6> with_camera;
-  double inverse_range_variance = 0.0;  // marginal [1/m^2]; 0: known point
 };
 
 struct FeatureMarginal {
@@ -60,14 +61,18 @@ struct UpdateReport {
 struct FilterOptions {
   bool fej = true;  // Jacobians at first estimates (slam-spec 1)
   PointForm form = PointForm::kBearingRange;
+  /// Read-out time of a rolling shutter, first to last row [s], and how sure that is; sigma 0: as
+  /// given, not estimated.
+  double readout_s = 0.0;
+  double readout_sigma_s = 0.0;
   double min_inverse_range = 1e-4;  // [1/m]; of points given in metres (the state may pass 0)
 };
 
 /// State and covariance of one moving camera and its map (slam-spec 1, 2, 5.4).
 ///
-/// x = [camera 12 | pose clones 6 each and features 3 or 1 each, as they were born]. The covariance
-/// is private: it changes by Predict(), Update(), and the augmenting and removing calls, nothing
-/// else. Not thread-safe. Derivations: README.md.
+/// x = [camera 12 | read-out 1, if estimated | pose clones 6 each and features 3 or 1 each, as they
+/// were born]. The covariance is private: it changes by Predict(), Update(), and the augmenting and
+/// removing calls, nothing else. Not thread-safe. Derivations: README.md.
 class FilterState {
  public:
   static constexpr int kCameraDim = 12;
@@ -87,6 +92,9 @@ class FilterState {
   Matrix6d PoseCovariance() const;  // [position (world), rotation (local)]
   /// Copy of the whole covariance, for tests and evaluation.
   Eigen::MatrixXd FullCovariance() const { return covariance_.Full(); }
+
+  /// Read-out time of the rolling shutter as it stands [s]; 0: global shutter.
+  double readout_s() const { return readout_s_; }
 
   std::size_t feature_count() const { return features_.size(); }
   std::size_t anchor_count() const { return anchors_.size(); }
@@ -117,17 +125,13 @@ class FilterState {
   /// Corrects everything with the observations of one frame (joint update, slam-spec 2).
   ///
   /// n = dim(), m = 2 * observations.size(): O(n^2 m). Measurements are linearised at
-  /// `linearisation`, which may be a better pose than the predicted one; with more `iterations`,
-  /// then again where the correction leads (iterated update: worth it while depths are unknown).
-  /// `pose_covariance`, if given, is how well `linearisation` is known: a baseline that does not
-  /// stand out from it then says nothing of depth (README: depth from noise).
-  /// Uses the information form when m > n. On error nothing changes:
+  /// `linearisation`, which may be a better pose than the predicted one (iterated update with that
+  /// as its only iterate). Uses the information form when m > n. On error nothing changes:
   ///   InvalidArgument     unknown feature, or one not in view from `linearisation`
   ///   FailedPrecondition  innovation covariance not positive definite
   absl::StatusOr<UpdateReport> Update(const CameraModel& camera,
                                       std::span<const Observation> observations,
-                                      const Rigid3& linearisation, int iterations = 1,
-                                      const Matrix6d* pose_covariance = nullptr);
+                                      const Rigid3& linearisation);
 
   /// Removes features whose inverse range is negative by two sigma; returns them.
   std::vector<FeatureId> RemoveBehind();
@@ -161,21 +165,10 @@ class FilterState {
   void RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size);
   absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
                                           std::span<const Observation> observations,
-                                          const Rigid3& linearisation, const Eigen::VectorXd& ahead,
-                                          const Matrix6d* pose_covariance) const;
-  /// Variance per axis of the camera's position relative to an anchor [m^2].
-  double BaselineVariance(int anchor_offset, const Matrix6d& pose_covariance,
-                          const Eigen::LLT<Matrix6d>& prior) const;
-  /// `final`: also correct the covariance.
-  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, bool final,
-                                             UpdateReport& report);
-  absl::Status Undo(const std::vector<Feature>& before, const absl::Status& status);
-  void MoveFeatures(const Eigen::VectorXd& step);
+                                          const Rigid3& linearisation) const;
+  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report);
   absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report);
   void Correct(const Eigen::VectorXd& error);
-  /// Carries the covariance along when estimates move by `step`: a scale error then moves them by
-  /// what they are now, not by what they were (README: scale).
-  void CarryScale(const Eigen::VectorXd& step);
 
   FilterOptions options_;
   CameraMotion camera_;
@@ -184,6 +177,8 @@ class FilterState {
   std::vector<Anchor> anchors_;    // rising ids
   std::vector<Feature> features_;  // rising ids
   AnchorPoseId next_anchor_ = 1;
+  double readout_s_ = 0.0;
+  int readout_offset_ = -1;  // -1: not estimated
   Covariance covariance_;
 };
 

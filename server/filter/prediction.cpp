@@ -58,7 +58,7 @@ std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
   SmallRows h(2, 12 + size);
   h << at->d_camera, at->d_anchor, at->d_point.rightCols(size);
   const SmallRows hp = h * p;
-  PredictedPixel result{*at, hp * h.transpose(), hp.leftCols<6>(), p(11 + size, 11 + size)};
+  PredictedPixel result{*at, hp * h.transpose(), hp.leftCols<6>()};
   if (size == 1) {
     const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
     result.covariance += d_bearing * feature->frozen_covariance * d_bearing.transpose();
@@ -71,7 +71,7 @@ std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
   const auto at = PredictFixed(camera, camera_.world_from_camera, known_point);
   if (!at) return std::nullopt;
   const Eigen::Matrix<double, 2, 6> hp = at->d_camera * PoseCovariance();
-  return PredictedPixel{*at, hp * at->d_camera.transpose(), hp, 0.0};
+  return PredictedPixel{*at, hp * at->d_camera.transpose(), hp};
 }
 
 FeatureMarginal FilterState::Marginal(FeatureId id) const {

@@ -169,11 +169,6 @@ std::optional<ConditionalPixel> PixelGivenPose(const CameraModel& camera, const 
   result.pixel = at->pixel + along * Step(prior.world_from_camera, pose);
   const Matrix2d rest = predicted.covariance - total * predicted.with_camera.transpose();
   result.covariance = 0.5 * (rest + rest.transpose());
-  // Where the prediction saw no baseline an unknown range did not matter; at `pose` it may.
-  const Vector2d baseline = at->d_point.col(2) - predicted.at.d_point.col(2);
-  if (predicted.inverse_range_variance > 0.0) {
-    result.covariance += predicted.inverse_range_variance * baseline * baseline.transpose();
-  }
   result.d_pose = at->d_camera + along;
   return result;
 }

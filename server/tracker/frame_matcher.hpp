@@ -19,6 +19,9 @@ struct LandmarkMatch {
   bool searched = false;
   bool found = false;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // found, else where it was expected
+  /// `pixel` less this is where it would have been seen in mid-exposure [px] (rolling shutter).
+  Eigen::Vector2d row_shift = Eigen::Vector2d::Zero();
+  Eigen::Vector2d d_readout = Eigen::Vector2d::Zero();  // row_shift / read-out time [px/s]
   Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();
   double weight = 0.0;  // of the robust pose; 0: outlier or not found
 
@@ -54,7 +57,7 @@ class FrameMatcher {
                          const LandmarkMap& map, std::mt19937_64& random) const;
   void Search(const ImagePyramid& pyramid, const CameraModel& camera, const LandmarkMap& map,
               const PosePrior& prior, const Rigid3& pose, const Matrix6d& pose_covariance,
-              LandmarkMatch& match);
+              const CameraMotion& motion, double readout_s, LandmarkMatch& match);
   RobustPose Solve(const CameraModel& camera, const PosePrior& prior,
                    std::vector<LandmarkMatch>& in_view, std::mt19937_64& random) const;
 

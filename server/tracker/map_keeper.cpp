@@ -85,7 +85,10 @@ std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vecto
   const double sigma = matcher.PixelSigma(*frame.camera, pixel);
   FeatureBirth birth;
   birth.id = map.NextId();
-  birth.bearing = *bearing;
+  // As seen in mid-exposure: the row's own pose is turned by `late` from the clone's.
+  const double late =
+      filter.readout_s() * (std::clamp((pixel.y() + 0.5) / frame.camera->height(), 0.0, 1.0) - 0.5);
+  birth.bearing = ExpQuaternion(filter.camera().angular_velocity_rad_s * late) * *bearing;
   birth.bearing_covariance = sigma * sigma * d_bearing * d_bearing.transpose();
   birth.inverse_range = depth.inverse_range;
   birth.inverse_range_sigma = depth.inverse_range_sigma;

@@ -10,10 +10,8 @@ namespace {
 constexpr int kSettledFeatures = 12;    // with known depth, before poses are published
 constexpr int kLongestSettling = 15;    // frames: under pure rotation depth never settles
 constexpr double kSettledDepth = 0.25;  // sigma / inverse range
-constexpr int kYoung = 60;              // frames: depths are unknown, updates iterate
-constexpr int kYoungIterations = 3;
-constexpr int kFewestToUpdate = 3;  // matches: fewer can agree by chance
-constexpr double kSurprise = 3.0;   // times the motion noise, after an unexpected move
+constexpr int kFewestToUpdate = 3;      // matches: fewer can agree by chance
+constexpr double kSurprise = 3.0;       // times the motion noise, after an unexpected move
 
 class StopWatch {
  public:
@@ -28,8 +26,13 @@ class StopWatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-FilterOptions MakeFilterOptions(const TrackerOptions& options) {
+/// The camera's own word on its shutter, else the filter finds out.
+FilterOptions MakeFilterOptions(const TrackerOptions& options, const CameraModel& camera) {
+  constexpr double kSurely = 0.1;  // of a read-out time that camera.yaml gives
   FilterOptions filter;
+  filter.readout_s = camera.intrinsics().rolling_shutter_readout_s;
+  filter.readout_sigma_s =
+      filter.readout_s > 0.0 ? kSurely * filter.readout_s : options.readout_sigma_s;
   filter.fej = options.fej;
   filter.form = options.range_only ? PointForm::kRangeOnly : PointForm::kBearingRange;
   return filter;
@@ -47,7 +50,7 @@ Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
     : source_(source),
       options_(options),
       random_(options.seed),
-      filter_(MakeFilterOptions(options)),
+      filter_(MakeFilterOptions(options, *source.camera)),
       matcher_(options),
       keeper_(options),
       starter_(source, options),
@@ -154,13 +157,12 @@ void Tracker::Impl::Correct(const CameraModel& camera) {
       if (const auto* known = std::get_if<Eigen::Vector3d>(&match.point)) {
         observation.known_point = *known;
       }
-      observation.pixel = match.pixel;
+      observation.pixel = match.pixel - match.row_shift;
+      observation.d_readout = match.d_readout;
       observation.noise = match.noise / match.weight;  // soft gate
       observations.push_back(observation);
     }
-    const auto report =
-        filter_.Update(camera, observations, matches_.pose.world_from_camera,
-                       frames_ < kYoung ? kYoungIterations : 1, &matches_.pose.covariance);
+    const auto report = filter_.Update(camera, observations, matches_.pose.world_from_camera);
     if (!report.ok()) matches_.accepted = 0;
   }
   times_.update_ms = watch.Lap_ms();

@@ -30,6 +30,7 @@ const Key kKeys[] = {
     {"range_only", &O::range_only, 0, 1},
     {"pixel_sigma_px", &O::pixel_sigma_px, 0.01, 20},
     {"pixel_sigma_growth", &O::pixel_sigma_growth, 0, 10},
+    {"readout_sigma_s", &O::readout_sigma_s, 0, 0.1},
     {"robust_cutoff", &O::robust_cutoff, 2, 20},
     {"first_stage", &O::first_stage, 4, 500},
     {"measured_per_frame", &O::measured_per_frame, 8, 500},

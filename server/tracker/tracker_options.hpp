@@ -26,7 +26,9 @@ struct TrackerOptions {
   bool range_only = false;          // ESID: bearings frozen at birth; false: SID
   double pixel_sigma_px = 0.5;      // of a match at the picture's centre, lens and warp included
   double pixel_sigma_growth = 1.0;  // sigma (1 + growth d / d_max): lens models fit worse outside
-  double robust_cutoff = 4.5;       // Mahalanobis distance from which a match is ignored
+  /// Of the rolling shutter's read-out time where camera.yaml is silent; 0: taken as global.
+  double readout_sigma_s = 0.015;
+  double robust_cutoff = 4.5;  // Mahalanobis distance from which a match is ignored
 
   // Search (slam-spec 5.1).
   int first_stage = 20;         // features searched widely, for the robust pose

@@ -64,7 +64,7 @@ class Simulation {
     filter_.Predict(dt, MotionNoise());
     const auto seen = See(noise_px);
     const RobustPose pose = PoseFrom(seen);
-    const auto report = filter_.Update(lens_, seen, pose.world_from_camera, 2, &pose.covariance);
+    const auto report = filter_.Update(lens_, seen, pose.world_from_camera);
     ASSERT_TRUE(report.ok()) << report.status();
   }
 
