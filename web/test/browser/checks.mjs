@@ -153,7 +153,7 @@ async function placeMany(context, pane, aim) {
   const used = new Map(); // object -> how often
   const refusals = [];
   let count = 0;
-  for (const end = Date.now() + 90_000; count < PER_PANE && Date.now() < end; ) {
+  for (const end = Date.now() + 150_000; count < PER_PANE && Date.now() < end; ) {
     const before = await expert.annotationIds();
     const click = await aim(context, used);
     if (!click) {
@@ -280,9 +280,8 @@ async function cubeError({ expert, truth, camera }, { point }) {
   const drawn = await expert.marks();
   const frame = truth.frame(drawn.id);
   if (!frame) return undefined;
-  const wanted = cubePixels(camera, frame.world_from_camera, point, CUBE_M);
-  const inside = ([u, v]) => u > 8 && v > 8 && u < camera.widthPx - 8 && v < camera.heightPx - 8;
-  if (wanted.length === 0 || !wanted.every(inside)) return undefined;
+  const wanted = cubePixels(camera, frame.world_from_camera, point, CUBE_M, 8);
+  if (wanted.length === 0) return undefined;
   const { ratio, left, top, scale } = drawn;
   const found = pixelsOf(decodePng(drawn.png), ACCENT, 40).map(([x, y]) => [
     ((x + 0.5) / ratio - left) / scale - 0.5,

@@ -47,22 +47,25 @@ export function unproject(camera, [u, v], z) {
   return [at[0] * z, at[1] * z, z];
 }
 
-/** Pixels along the 12 edges of a cube about a point, axes parallel to world, evenly spread. */
-export function cubePixels(camera, pose, centre, size) {
-  const corner = (i) =>
-    plus(centre, [
-      i & 1 ? size / 2 : -size / 2,
-      i & 2 ? size / 2 : -size / 2,
-      i & 4 ? size / 2 : -size / 2,
-    ]);
+/**
+ * Pixels along the 12 edges of a cube about a point, axes parallel to world, evenly spread; nothing
+ * unless all its corners are at least `border` px inside the picture.
+ */
+export function cubePixels(camera, pose, centre, size, border) {
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => {
+    const offset = [i & 1, i & 2, i & 4].map((bit) => (bit ? size / 2 : -size / 2));
+    return project(camera, inCamera(pose, plus(centre, offset)));
+  });
+  const inside = ([u, v]) =>
+    u > border && v > border && u < camera.widthPx - border && v < camera.heightPx - border;
+  if (!corners.every((corner) => corner && inside(corner))) return [];
   const out = [];
   for (let i = 0; i < 8; ++i) {
     for (const bit of [1, 2, 4]) {
       if (i & bit) continue;
-      const a = project(camera, inCamera(pose, corner(i)));
-      const b = project(camera, inCamera(pose, corner(i | bit)));
-      if (!a || !b) continue;
-      const steps = Math.max(2, Math.ceil(2 * Math.hypot(a[0] - b[0], a[1] - b[1])));
+      const a = corners[i];
+      const b = corners[i | bit];
+      const steps = Math.max(2, Math.ceil(2 * length(minus(a, b))));
       for (let k = 0; k <= steps; ++k) out.push(plus(times(a, 1 - k / steps), times(b, k / steps)));
     }
   }
