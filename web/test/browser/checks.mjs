@@ -261,11 +261,14 @@ async function drawnCubes(context) {
     await row.locator('.pick').click();
     await expert.page.mouse.move(2, 2);
     await sleep(300);
-    for (let i = 0; i < 3; ++i) {
-      if ((await row.innerText()).includes('do not trust')) break;
+    // Until it has been seen three times, as the wearer looks round; at most four seconds.
+    for (let seen = 0, i = 0; seen < 3 && i < 20; ++i) {
+      await sleep(200);
+      if ((await row.innerText()).includes('do not trust')) continue;
       const error = await cubeError(context, entry);
-      if (error !== undefined) errors.push(error);
-      await sleep(150);
+      if (error === undefined) continue;
+      errors.push(error);
+      ++seen;
     }
   }
   await shot(context, 'cubes');
