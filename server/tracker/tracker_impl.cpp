@@ -112,6 +112,10 @@ void Tracker::Impl::Begin(const Frame& frame) {
   times_.manage_ms = watch.Lap_ms();
   if (!started_) return;  // nothing to see at all: try again with the next frame
   frames_ = 0;
+  // Features that are born in this frame are seen in it.
+  const int born = static_cast<int>(filter_.feature_count());
+  matches_.attempted += born;
+  matches_.accepted += born;
   if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
 }
 
@@ -185,6 +189,24 @@ void Tracker::Impl::Follow(const Frame& frame, double dt) {
   times_.manage_ms = watch.Lap_ms();
 }
 
+/// The target leaves; what was seen of it in this frame stays as ordinary features, at the depth
+/// that the target gave. So scale does not rest on parallax alone if the wearer stood still at the
+/// start.
+void Tracker::Impl::KeepTargetPoints(const Frame& frame) {
+  constexpr double kDepthSigma = 0.01;  // of the range
+  std::optional<AnchorPoseId> anchor;
+  const Rigid3 camera_from_world = filter_.camera().world_from_camera.Inverse();
+  for (const LandmarkMatch& match : matches_.in_view) {
+    const auto* point = std::get_if<Eigen::Vector3d>(&match.point);
+    if (point == nullptr || !match.accepted()) continue;
+    if (!anchor) anchor = filter_.AddAnchor();
+    const double inverse = 1.0 / (camera_from_world * *point).norm();
+    keeper_.Plant(frame, match.pixel, {inverse, kDepthSigma * inverse}, *anchor, matcher_, filter_,
+                  map_);
+  }
+  if (anchor) filter_.Remove({});  // a clone that nothing was planted in goes again
+}
+
 void Tracker::Impl::Manage(const Frame& frame) {
   // A frame in which hardly anything was found says nothing about single features.
   const bool telling = matches_.accepted >= 0.3 * matches_.attempted;
@@ -192,7 +214,8 @@ void Tracker::Impl::Manage(const Frame& frame) {
     if (!match.searched || (!telling && !match.accepted())) continue;
     map_.Find(match.id)->Record(match.accepted(), frames_);
   }
-  if (starter_.TargetExpired(frames_)) {
+  if (starter_.TargetExpired(frames_) && matches_.accepted > 0) {
+    KeepTargetPoints(frame);
     std::vector<FeatureId> expired;
     for (const Landmark& landmark : map_.all()) {
       if (landmark.known) expired.push_back(landmark.id);

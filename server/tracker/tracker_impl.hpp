@@ -34,6 +34,7 @@ class Tracker::Impl {
   void PredictAndSearch(const CameraModel& camera, double dt);
   void Correct(const CameraModel& camera);
   void Manage(const Frame& frame);
+  void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
   bool Settled() const;
   std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times) const;
