@@ -5,21 +5,17 @@ namespace saccade {
 Eigen::MatrixXd Covariance::Block(int row, int col, int rows, int cols) const {
   Eigen::MatrixXd block(rows, cols);
   for (int c = 0; c < cols; ++c) {
-    for (int r = 0; r < rows; ++r)
-      block(r, c) = at(row + r, col + c);
+    for (int r = 0; r < rows; ++r) block(r, c) = at(row + r, col + c);
   }
   return block;
 }
 
-void Covariance::CopyColumns(int col, int count,
-                             Eigen::Ref<Eigen::MatrixXd> out) const {
+void Covariance::CopyColumns(int col, int count, Eigen::Ref<Eigen::MatrixXd> out) const {
   for (int r = 0; r < col; ++r) {
-    for (int c = 0; c < count; ++c)
-      out(r, c) = p_(col + c, r);
+    for (int c = 0; c < count; ++c) out(r, c) = p_(col + c, r);
   }
   for (int c = 0; c < count; ++c) {
-    for (int r = 0; r < c; ++r)
-      out(col + r, c) = p_(col + c, col + r);
+    for (int r = 0; r < c; ++r) out(col + r, c) = p_(col + c, col + r);
     const int from = col + c;
     out.col(c).segment(from, n_ - from) = p_.col(from).segment(from, n_ - from);
   }
@@ -41,22 +37,20 @@ int Covariance::Append(int size) {
   return offset;
 }
 
-void Covariance::Keep(const std::vector<int> &keep) {
+void Covariance::Keep(const std::vector<int>& keep) {
   const int m = static_cast<int>(keep.size());
   for (int c = 0; c < m; ++c) {
     const int from = keep[c];
-    for (int r = c; r < m; ++r)
-      p_(r, c) = p_(keep[r], from);
+    for (int r = c; r < m; ++r) p_(r, c) = p_(keep[r], from);
   }
   n_ = m;
 }
 
-void Covariance::Downdate(const Eigen::Ref<const Eigen::MatrixXd> &w) {
+void Covariance::Downdate(const Eigen::Ref<const Eigen::MatrixXd>& w) {
   p_.topLeftCorner(n_, n_).selfadjointView<Eigen::Lower>().rankUpdate(w, -1.0);
 }
 
-void Covariance::TransformBlock(
-    int offset, const Eigen::Ref<const Eigen::MatrixXd> &block) {
+void Covariance::TransformBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& block) {
   const int size = static_cast<int>(block.rows());
   const Eigen::MatrixXd diagonal = Block(offset, offset, size, size);
   if (offset > 0) {
@@ -65,38 +59,34 @@ void Covariance::TransformBlock(
   }
   const int below = n_ - offset - size;
   if (below > 0) {
-    const Eigen::MatrixXd under =
-        p_.block(offset + size, offset, below, size) * block.transpose();
+    const Eigen::MatrixXd under = p_.block(offset + size, offset, below, size) * block.transpose();
     p_.block(offset + size, offset, below, size) = under;
   }
   p_.block(offset, offset, size, size) = block * diagonal * block.transpose();
 }
 
-void Covariance::TransformRankOne(const Eigen::VectorXd &d,
-                                  const Eigen::VectorXd &w) {
+void Covariance::TransformRankOne(const Eigen::VectorXd& d, const Eigen::VectorXd& w) {
   auto p = p_.topLeftCorner(n_, n_).selfadjointView<Eigen::Lower>();
   Eigen::VectorXd u = p * w;
   u += 0.5 * w.dot(u) * d;
   p.rankUpdate(d, u, 1.0);
 }
 
-void Covariance::ReplaceBlock(
-    int offset, const Eigen::Ref<const Eigen::MatrixXd> &diagonal_block) {
+void Covariance::ReplaceBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& diagonal_block) {
   const int size = static_cast<int>(diagonal_block.rows());
   p_.block(offset, 0, size, offset).setZero();
   p_.block(offset, offset, n_ - offset, size).setZero();
   p_.block(offset, offset, size, size) = diagonal_block;
 }
 
-void Covariance::AddBlock(int offset,
-                          const Eigen::Ref<const Eigen::MatrixXd> &block) {
+void Covariance::AddBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& block) {
   p_.block(offset, offset, block.rows(), block.cols()) += block;
 }
 
-void Covariance::Assign(const Eigen::MatrixXd &full) {
+void Covariance::Assign(const Eigen::MatrixXd& full) {
   n_ = 0;
   Append(static_cast<int>(full.rows()));
   p_.topLeftCorner(n_, n_) = full;
 }
 
-} // namespace saccade
+}  // namespace saccade

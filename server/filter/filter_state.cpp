@@ -10,12 +10,11 @@ namespace saccade {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-FilterState::FilterState(const FilterOptions &options) : options_(options) {
+FilterState::FilterState(const FilterOptions& options) : options_(options) {
   Reset(CameraMotion(), Matrix12d::Zero());
 }
 
-void FilterState::Reset(const CameraMotion &camera,
-                        const Matrix12d &covariance) {
+void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance) {
   camera_ = camera;
   first_pose_ = camera.world_from_camera;
   anchors_.clear();
@@ -31,8 +30,7 @@ void FilterState::Reset(const CameraMotion &camera,
   }
 }
 
-void FilterState::ResetCamera(const CameraMotion &camera,
-                              const Matrix12d &covariance) {
+void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covariance) {
   camera_ = camera;
   first_pose_ = camera.world_from_camera;
   covariance_.ReplaceBlock(0, covariance);
@@ -42,55 +40,44 @@ Matrix12d FilterState::CameraCovariance() const {
   return covariance_.Block(0, 0, kCameraDim, kCameraDim);
 }
 
-Matrix6d FilterState::PoseCovariance() const {
-  return covariance_.Block(0, 0, kPoseDim, kPoseDim);
-}
+Matrix6d FilterState::PoseCovariance() const { return covariance_.Block(0, 0, kPoseDim, kPoseDim); }
 
 std::vector<FeatureId> FilterState::FeatureIds() const {
   std::vector<FeatureId> ids;
   ids.reserve(features_.size());
-  for (const Feature &feature : features_)
-    ids.push_back(feature.id);
+  for (const Feature& feature : features_) ids.push_back(feature.id);
   return ids;
 }
 
-const FilterState::Feature *FilterState::Find(FeatureId id) const {
-  const auto at = std::lower_bound(
-      features_.begin(), features_.end(), id,
-      [](const Feature &f, FeatureId key) { return f.id < key; });
+const FilterState::Feature* FilterState::Find(FeatureId id) const {
+  const auto at = std::lower_bound(features_.begin(), features_.end(), id,
+                                   [](const Feature& f, FeatureId key) { return f.id < key; });
   return at != features_.end() && at->id == id ? &*at : nullptr;
 }
 
-const FilterState::Anchor &FilterState::AnchorOf(const Feature &feature) const {
-  return *std::lower_bound(
-      anchors_.begin(), anchors_.end(), feature.anchor,
-      [](const Anchor &a, AnchorPoseId key) { return a.id < key; });
+const FilterState::Anchor& FilterState::AnchorOf(const Feature& feature) const {
+  return *std::lower_bound(anchors_.begin(), anchors_.end(), feature.anchor,
+                           [](const Anchor& a, AnchorPoseId key) { return a.id < key; });
 }
 
-AnchoredPoint FilterState::Point(const Feature &feature, bool first) const {
-  const Anchor &anchor = AnchorOf(feature);
+AnchoredPoint FilterState::Point(const Feature& feature, bool first) const {
+  const Anchor& anchor = AnchorOf(feature);
   if (first) {
-    return {anchor.first, feature.first_bearing, feature.first_basis,
-            feature.inverse_range};
+    return {anchor.first, feature.first_bearing, feature.first_basis, feature.inverse_range};
   }
   return {anchor.pose, feature.bearing, feature.basis, feature.inverse_range};
 }
 
-AnchoredPoint FilterState::Point(FeatureId id) const {
-  return Point(*Find(id), false);
-}
+AnchoredPoint FilterState::Point(FeatureId id) const { return Point(*Find(id), false); }
 
-void FilterState::Predict(double dt, const MotionNoise &noise) {
+void FilterState::Predict(double dt, const MotionNoise& noise) {
   constexpr double kLongestStep_s = 1.0 / 30.0;
-  const int steps =
-      std::max(1, static_cast<int>(std::ceil(dt / kLongestStep_s - 0.1)));
+  const int steps = std::max(1, static_cast<int>(std::ceil(dt / kLongestStep_s - 0.1)));
   const double step = dt / steps;
   for (int k = 0; k < steps; ++k) {
-    const MotionJacobians jacobians =
-        LineariseMotion(camera_,
-                        options_.fej ? first_pose_.rotation
-                                     : camera_.world_from_camera.rotation,
-                        step, noise);
+    const MotionJacobians jacobians = LineariseMotion(
+        camera_, options_.fej ? first_pose_.rotation : camera_.world_from_camera.rotation, step,
+        noise);
     covariance_.TransformBlock(0, jacobians.f);
     covariance_.AddBlock(0, jacobians.q);
     camera_ = PropagateMotion(camera_, step);
@@ -98,30 +85,24 @@ void FilterState::Predict(double dt, const MotionNoise &noise) {
   }
 }
 
-void FilterState::Inflate(const Matrix12d &extra) {
-  covariance_.AddBlock(0, extra);
-}
+void FilterState::Inflate(const Matrix12d& extra) { covariance_.AddBlock(0, extra); }
 
 AnchorPoseId FilterState::AddAnchor() {
   const Eigen::MatrixXd rows = covariance_.Block(0, 0, kPoseDim, dim());
   const int offset = covariance_.Append(kPoseDim);
   for (int c = 0; c < offset; ++c) {
-    for (int r = 0; r < kPoseDim; ++r)
-      covariance_.lower(offset + r, c) = rows(r, c);
+    for (int r = 0; r < kPoseDim; ++r) covariance_.lower(offset + r, c) = rows(r, c);
   }
   covariance_.AddBlock(offset, rows.leftCols(kPoseDim));
-  anchors_.push_back(
-      {next_anchor_, offset, 0, camera_.world_from_camera, first_pose_});
+  anchors_.push_back({next_anchor_, offset, 0, camera_.world_from_camera, first_pose_});
   return next_anchor_++;
 }
 
-absl::Status FilterState::AddFeature(AnchorPoseId anchor,
-                                     const FeatureBirth &birth) {
+absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& birth) {
   const auto at = std::find_if(anchors_.begin(), anchors_.end(),
-                               [&](const Anchor &a) { return a.id == anchor; });
+                               [&](const Anchor& a) { return a.id == anchor; });
   if (at == anchors_.end()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("filter: no pose clone ", anchor));
+    return absl::InvalidArgumentError(absl::StrCat("filter: no pose clone ", anchor));
   }
   if (!features_.empty() && birth.id <= features_.back().id) {
     return absl::InvalidArgumentError(
@@ -129,8 +110,7 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor,
   }
   if (!(birth.inverse_range >= 0.0) || !(birth.inverse_range_sigma > 0.0) ||
       !std::isfinite(birth.inverse_range_sigma) || !birth.bearing.allFinite() ||
-      std::abs(birth.bearing.norm() - 1.0) > 1e-6 ||
-      !birth.bearing_covariance.allFinite()) {
+      std::abs(birth.bearing.norm() - 1.0) > 1e-6 || !birth.bearing_covariance.allFinite()) {
     return absl::InvalidArgumentError(
         "filter: a feature needs a unit bearing, inverse range >= 0 and its "
         "sigma above 0");
@@ -160,12 +140,10 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor,
 void FilterState::Remove(std::span<const FeatureId> ids) {
   std::vector<std::pair<int, int>> gone;
   for (const FeatureId id : ids) {
-    const Feature *found = Find(id);
-    if (found == nullptr)
-      continue;
+    const Feature* found = Find(id);
+    if (found == nullptr) continue;
     gone.emplace_back(found->offset, FeatureDim());
-    for (Anchor &anchor : anchors_)
-      anchor.users -= anchor.id == found->anchor ? 1 : 0;
+    for (Anchor& anchor : anchors_) anchor.users -= anchor.id == found->anchor ? 1 : 0;
     features_.erase(features_.begin() + (found - features_.data()));
   }
   for (auto anchor = anchors_.begin(); anchor != anchors_.end();) {
@@ -176,41 +154,35 @@ void FilterState::Remove(std::span<const FeatureId> ids) {
     gone.emplace_back(anchor->offset, kPoseDim);
     anchor = anchors_.erase(anchor);
   }
-  if (!gone.empty())
-    RemoveRows(gone);
+  if (!gone.empty()) RemoveRows(gone);
 }
 
-void FilterState::RemoveRows(
-    const std::vector<std::pair<int, int>> &offset_and_size) {
+void FilterState::RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size) {
   std::vector<char> dropped(dim(), 0);
-  for (const auto &[offset, size] : offset_and_size) {
+  for (const auto& [offset, size] : offset_and_size) {
     std::fill_n(dropped.begin() + offset, size, char{1});
   }
   std::vector<int> keep, moved(dim(), 0);
   keep.reserve(dim());
   for (int k = 0; k < dim(); ++k) {
     moved[k] = static_cast<int>(keep.size());
-    if (!dropped[k])
-      keep.push_back(k);
+    if (!dropped[k]) keep.push_back(k);
   }
   covariance_.Keep(keep);
-  for (Anchor &anchor : anchors_)
-    anchor.offset = moved[anchor.offset];
-  for (Feature &feature : features_)
-    feature.offset = moved[feature.offset];
+  for (Anchor& anchor : anchors_) anchor.offset = moved[anchor.offset];
+  for (Feature& feature : features_) feature.offset = moved[feature.offset];
 }
 
 std::vector<FeatureId> FilterState::RemoveBehind() {
   std::vector<FeatureId> gone;
   const int last = FeatureDim() - 1;
-  for (const Feature &feature : features_) {
+  for (const Feature& feature : features_) {
     const int at = feature.offset + last;
     const double sigma = std::sqrt(std::max(0.0, covariance_.at(at, at)));
-    if (feature.inverse_range + 2.0 * sigma < 0.0)
-      gone.push_back(feature.id);
+    if (feature.inverse_range + 2.0 * sigma < 0.0) gone.push_back(feature.id);
   }
   Remove(gone);
   return gone;
 }
 
-} // namespace saccade
+}  // namespace saccade

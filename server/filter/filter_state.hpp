@@ -22,21 +22,19 @@ using AnchorPoseId = std::uint32_t;
 /// A feature as it enters the state: seen at `bearing` from a pose clone.
 struct FeatureBirth {
   FeatureId id = 0;
-  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ(); // unit, in the clone
-  Eigen::Matrix3d bearing_covariance =
-      Eigen::Matrix3d::Zero();      // of the bearing
-  double inverse_range = 1.0;       // [1/m]
-  double inverse_range_sigma = 0.5; // [1/m]
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();            // unit, in the clone
+  Eigen::Matrix3d bearing_covariance = Eigen::Matrix3d::Zero();  // of the bearing
+  double inverse_range = 1.0;                                    // [1/m]
+  double inverse_range_sigma = 0.5;                              // [1/m]
 };
 
 /// One matched pixel: of a feature, or of a point that is known and therefore
 /// outside the state.
 struct Observation {
   FeatureId id = 0;
-  std::optional<Eigen::Vector3d>
-      known_point; // [m, world]; then `id` is not looked at
+  std::optional<Eigen::Vector3d> known_point;  // [m, world]; then `id` is not looked at
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d noise = Eigen::Matrix2d::Identity(); // R [px^2]
+  Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();  // R [px^2]
   /// d pixel / d read-out time [px/s]; `pixel` is corrected with the filter's
   /// present read-out.
   Eigen::Vector2d d_readout = Eigen::Vector2d::Zero();
@@ -45,28 +43,27 @@ struct Observation {
 /// What a prediction's errors look like: z - h = -noise, split by where it
 /// comes from.
 struct PredictedPixel {
-  PixelPrediction at;         // linearised at the filter's camera pose
-  Eigen::Matrix2d covariance; // H P H^T [px^2], without measurement noise
+  PixelPrediction at;          // linearised at the filter's camera pose
+  Eigen::Matrix2d covariance;  // H P H^T [px^2], without measurement noise
   /// Cov(H error, camera pose error) [position, rotation].
   Eigen::Matrix<double, 2, 6> with_camera;
 };
 
 struct FeatureMarginal {
-  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();      // [m]
-  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero(); // [m^2]
-  Eigen::Matrix3d covariance_in_camera =
-      Eigen::Matrix3d::Zero(); // cross terms included [m^2]
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
+  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // [m^2]
+  Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // cross terms included [m^2]
   double inverse_range = 0.0,
-         inverse_range_sigma = 0.0; // from the anchor [1/m]
+         inverse_range_sigma = 0.0;  // from the anchor [1/m]
 };
 
 struct UpdateReport {
   int rows = 0;
-  double nis = 0.0; // r^T S^-1 r, of `rows` degrees of freedom
+  double nis = 0.0;  // r^T S^-1 r, of `rows` degrees of freedom
 };
 
 struct FilterOptions {
-  bool fej = true; // Jacobians at first estimates (slam-spec 1)
+  bool fej = true;  // Jacobians at first estimates (slam-spec 1)
   PointForm form = PointForm::kBearingRange;
   /// Read-out time of a rolling shutter, first to last row [s], and how sure
   /// that is; sigma 0: as given, not estimated.
@@ -76,8 +73,7 @@ struct FilterOptions {
   /// before, the first depths are still being sorted out and their directions
   /// mean nothing.
   int carry_scale_after = 60;
-  double min_inverse_range =
-      1e-4; // [1/m]; of points given in metres (the state may pass 0)
+  double min_inverse_range = 1e-4;  // [1/m]; of points given in metres (the state may pass 0)
 };
 
 /// State and covariance of one moving camera and its map (slam-spec 1, 2, 5.4).
@@ -87,24 +83,24 @@ struct FilterOptions {
 /// Predict(), Update(), and the augmenting and removing calls, nothing else.
 /// Not thread-safe. Derivations: README.md.
 class FilterState {
-public:
+ public:
   static constexpr int kCameraDim = 12;
   static constexpr int kPoseDim = 6;
 
-  explicit FilterState(const FilterOptions &options);
+  explicit FilterState(const FilterOptions& options);
 
   /// Forgets everything; the camera is at `camera`, known to `covariance` (12 x
   /// 12).
-  void Reset(const CameraMotion &camera, const Matrix12d &covariance);
+  void Reset(const CameraMotion& camera, const Matrix12d& covariance);
   /// Puts the camera elsewhere, without knowledge shared with the map
   /// (slam-spec 6).
-  void ResetCamera(const CameraMotion &camera, const Matrix12d &covariance);
+  void ResetCamera(const CameraMotion& camera, const Matrix12d& covariance);
 
-  const FilterOptions &options() const { return options_; }
+  const FilterOptions& options() const { return options_; }
   int dim() const { return covariance_.dim(); }
-  const CameraMotion &camera() const { return camera_; }
+  const CameraMotion& camera() const { return camera_; }
   Matrix12d CameraCovariance() const;
-  Matrix6d PoseCovariance() const; // [position (world), rotation (local)]
+  Matrix6d PoseCovariance() const;  // [position (world), rotation (local)]
   /// Copy of the whole covariance, for tests and evaluation.
   Eigen::MatrixXd FullCovariance() const { return covariance_.Full(); }
 
@@ -120,26 +116,24 @@ public:
   FeatureMarginal Marginal(FeatureId id) const;
 
   /// Carries the camera `dt` seconds on, in steps of at most 1/30 s.
-  void Predict(double dt, const MotionNoise &noise);
+  void Predict(double dt, const MotionNoise& noise);
   /// Widens what is known of the camera's pose and velocities by P += `extra`.
-  void Inflate(const Matrix12d &extra);
+  void Inflate(const Matrix12d& extra);
 
   /// Clones the camera's pose into the state, fully correlated.
   AnchorPoseId AddAnchor();
   /// Starts a feature in a clone. InvalidArgument: unknown anchor, id not
   /// rising, numbers not usable.
-  absl::Status AddFeature(AnchorPoseId anchor, const FeatureBirth &birth);
+  absl::Status AddFeature(AnchorPoseId anchor, const FeatureBirth& birth);
   /// Removes features (unknown ids are ignored), and the clones that then carry
   /// none.
   void Remove(std::span<const FeatureId> ids);
 
   /// Pixel of a feature at the current camera pose, with its uncertainty;
   /// nothing if not in view.
-  std::optional<PredictedPixel> Predicted(const CameraModel &camera,
-                                          FeatureId id) const;
-  std::optional<PredictedPixel>
-  Predicted(const CameraModel &camera,
-            const Eigen::Vector3d &known_point) const;
+  std::optional<PredictedPixel> Predicted(const CameraModel& camera, FeatureId id) const;
+  std::optional<PredictedPixel> Predicted(const CameraModel& camera,
+                                          const Eigen::Vector3d& known_point) const;
 
   /// Corrects everything with the observations of one frame (joint update,
   /// slam-spec 2).
@@ -151,21 +145,21 @@ public:
   ///   InvalidArgument     unknown feature, or one not in view from
   ///   `linearisation` FailedPrecondition  innovation covariance not positive
   ///   definite
-  absl::StatusOr<UpdateReport> Update(const CameraModel &camera,
+  absl::StatusOr<UpdateReport> Update(const CameraModel& camera,
                                       std::span<const Observation> observations,
-                                      const Rigid3 &linearisation);
+                                      const Rigid3& linearisation);
 
   /// Removes features whose inverse range is negative by two sigma; returns
   /// them.
   std::vector<FeatureId> RemoveBehind();
 
-private:
+ private:
   struct Anchor {
     AnchorPoseId id = 0;
     int offset = 0;
     int users = 0;
     Rigid3 pose;
-    Rigid3 first; // estimate that Jacobians use with fej
+    Rigid3 first;  // estimate that Jacobians use with fej
   };
   struct Feature {
     FeatureId id = 0;
@@ -174,48 +168,40 @@ private:
     Eigen::Vector3d bearing, first_bearing;
     Eigen::Matrix<double, 3, 2> basis, first_basis;
     double inverse_range = 1.0;
-    Eigen::Matrix2d frozen_covariance =
-        Eigen::Matrix2d::Zero(); // of the bearing, range only
+    Eigen::Matrix2d frozen_covariance = Eigen::Matrix2d::Zero();  // of the bearing, range only
   };
-  struct Linearised; // of all observations: update.cpp
+  struct Linearised;  // of all observations: update.cpp
 
-  int FeatureDim() const {
-    return options_.form == PointForm::kBearingRange ? 3 : 1;
-  }
-  const Feature *Find(FeatureId id) const;
-  const Anchor &AnchorOf(const Feature &feature) const;
-  AnchoredPoint Point(const Feature &feature, bool first) const;
+  int FeatureDim() const { return options_.form == PointForm::kBearingRange ? 3 : 1; }
+  const Feature* Find(FeatureId id) const;
+  const Anchor& AnchorOf(const Feature& feature) const;
+  AnchoredPoint Point(const Feature& feature, bool first) const;
   /// Pixel at the current estimates, Jacobians where the options say.
-  std::optional<PixelPrediction> Linearise(const CameraModel &camera,
-                                           const Rigid3 &pose,
-                                           const Feature &feature) const;
-  void RemoveRows(const std::vector<std::pair<int, int>> &offset_and_size);
-  absl::StatusOr<Linearised>
-  LineariseAll(const CameraModel &camera,
-               std::span<const Observation> observations,
-               const Rigid3 &linearisation) const;
-  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised &all,
-                                             UpdateReport &report);
-  absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised &all,
-                                                  UpdateReport &report);
-  void Correct(const Eigen::VectorXd &error);
+  std::optional<PixelPrediction> Linearise(const CameraModel& camera, const Rigid3& pose,
+                                           const Feature& feature) const;
+  void RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size);
+  absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
+                                          std::span<const Observation> observations,
+                                          const Rigid3& linearisation) const;
+  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report);
+  absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report);
+  void Correct(const Eigen::VectorXd& error);
   /// Carries the covariance along when estimates move by `step`: a scale error
   /// then moves them by what they are now, not by what they were (README:
   /// scale).
-  void CarryScale(const Eigen::VectorXd &step);
+  void CarryScale(const Eigen::VectorXd& step);
 
   FilterOptions options_;
   CameraMotion camera_;
-  Eigen::Quaterniond first_rotation_ =
-      Eigen::Quaterniond::Identity(); // of this frame
+  Eigen::Quaterniond first_rotation_ = Eigen::Quaterniond::Identity();  // of this frame
   Rigid3 first_pose_;
-  std::vector<Anchor> anchors_;   // rising ids
-  std::vector<Feature> features_; // rising ids
+  std::vector<Anchor> anchors_;    // rising ids
+  std::vector<Feature> features_;  // rising ids
   AnchorPoseId next_anchor_ = 1;
   double readout_s_ = 0.0;
-  int readout_offset_ = -1; // -1: not estimated
-  int updates_ = 0;         // since Reset()
+  int readout_offset_ = -1;  // -1: not estimated
+  int updates_ = 0;          // since Reset()
   Covariance covariance_;
 };
 
-} // namespace saccade
+}  // namespace saccade
