@@ -5,17 +5,15 @@
 
 namespace saccade {
 
-/// Joint covariance of a filter. Only the lower triangle of the leading n x n
-/// block is valid: the rank update then costs half, and nobody can make it
-/// asymmetric (architecture, section 7).
+/// Joint covariance of a filter. Only the lower triangle of the leading n x n block is valid: the
+/// rank update then costs half, and nobody can make it asymmetric (architecture, section 7).
 class Covariance {
  public:
   int dim() const { return n_; }
   double at(int row, int col) const { return row >= col ? p_(row, col) : p_(col, row); }
   double& lower(int row, int col) { return p_(row, col); }
 
-  /// rows x cols block with its corner at (row, col), which may cross the
-  /// diagonal.
+  /// rows x cols block with its corner at (row, col), which may cross the diagonal.
   Eigen::MatrixXd Block(int row, int col, int rows, int cols) const;
   Eigen::MatrixXd Full() const { return p_.topLeftCorner(n_, n_).selfadjointView<Eigen::Lower>(); }
 
@@ -28,13 +26,11 @@ class Covariance {
   void Keep(const std::vector<int>& keep);
   /// P <- P - W W^T with W n x m.
   void Downdate(const Eigen::Ref<const Eigen::MatrixXd>& w);
-  /// P <- T P T^T where T is the identity but for the square `block` on the
-  /// diagonal at `offset`.
+  /// P <- T P T^T where T is the identity but for the square `block` on the diagonal at `offset`.
   void TransformBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& block);
   /// P <- T P T^T with T = I + d w^T (both n).
   void TransformRankOne(const Eigen::VectorXd& d, const Eigen::VectorXd& w);
-  /// Zeroes rows and columns [offset, offset + size) and puts `diagonal_block`
-  /// there.
+  /// Zeroes rows and columns [offset, offset + size) and puts `diagonal_block` there.
   void ReplaceBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& diagonal_block);
   /// Adds a symmetric block on the diagonal at `offset`.
   void AddBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& block);

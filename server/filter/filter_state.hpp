@@ -28,20 +28,17 @@ struct FeatureBirth {
   double inverse_range_sigma = 0.5;                              // [1/m]
 };
 
-/// One matched pixel: of a feature, or of a point that is known and therefore
-/// outside the state.
+/// One matched pixel: of a feature, or of a point that is known and therefore outside the state.
 struct Observation {
   FeatureId id = 0;
   std::optional<Eigen::Vector3d> known_point;  // [m, world]; then `id` is not looked at
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();  // R [px^2]
-  /// d pixel / d read-out time [px/s]; `pixel` is corrected with the filter's
-  /// present read-out.
+  /// d pixel / d read-out time [px/s]; `pixel` is corrected with the filter's present read-out.
   Eigen::Vector2d d_readout = Eigen::Vector2d::Zero();
 };
 
-/// What a prediction's errors look like: z - h = -noise, split by where it
-/// comes from.
+/// What a prediction's errors look like: z - h = -noise, split by where it comes from.
 struct PredictedPixel {
   PixelPrediction at;          // linearised at the filter's camera pose
   Eigen::Matrix2d covariance;  // H P H^T [px^2], without measurement noise
@@ -53,8 +50,7 @@ struct FeatureMarginal {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
   Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // [m^2]
   Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // cross terms included [m^2]
-  double inverse_range = 0.0,
-         inverse_range_sigma = 0.0;  // from the anchor [1/m]
+  double inverse_range = 0.0, inverse_range_sigma = 0.0;           // from the anchor [1/m]
 };
 
 struct UpdateReport {
@@ -65,23 +61,21 @@ struct UpdateReport {
 struct FilterOptions {
   bool fej = true;  // Jacobians at first estimates (slam-spec 1)
   PointForm form = PointForm::kBearingRange;
-  /// Read-out time of a rolling shutter, first to last row [s], and how sure
-  /// that is; sigma 0: as given, not estimated.
+  /// Read-out time of a rolling shutter, first to last row [s], and how sure that is; sigma 0: as
+  /// given, not estimated.
   double readout_s = 0.0;
   double readout_sigma_s = 0.0;
-  /// Updates after which a change of scale is kept unobserved (README: scale);
-  /// before, the first depths are still being sorted out and their directions
-  /// mean nothing.
+  /// Updates after which a change of scale is kept unobserved (README: scale); before, the first
+  /// depths are still being sorted out.
   int carry_scale_after = 60;
   double min_inverse_range = 1e-4;  // [1/m]; of points given in metres (the state may pass 0)
 };
 
 /// State and covariance of one moving camera and its map (slam-spec 1, 2, 5.4).
 ///
-/// x = [camera 12 | read-out 1, if estimated | pose clones 6 each and features
-/// 3 or 1 each, as they were born]. The covariance is private: it changes by
-/// Predict(), Update(), and the augmenting and removing calls, nothing else.
-/// Not thread-safe. Derivations: README.md.
+/// x = [camera 12 | read-out 1, if estimated | pose clones 6 each and features 3 or 1 each, as they
+/// were born]. The covariance is private: it changes by Predict(), Update(), and the augmenting and
+/// removing calls, nothing else. Not thread-safe. Derivations: README.md.
 class FilterState {
  public:
   static constexpr int kCameraDim = 12;
@@ -89,11 +83,9 @@ class FilterState {
 
   explicit FilterState(const FilterOptions& options);
 
-  /// Forgets everything; the camera is at `camera`, known to `covariance` (12 x
-  /// 12).
+  /// Forgets everything; the camera is at `camera`, known to `covariance` (12 x 12).
   void Reset(const CameraMotion& camera, const Matrix12d& covariance);
-  /// Puts the camera elsewhere, without knowledge shared with the map
-  /// (slam-spec 6).
+  /// Puts the camera elsewhere, without knowledge shared with the map (slam-spec 6).
   void ResetCamera(const CameraMotion& camera, const Matrix12d& covariance);
 
   const FilterOptions& options() const { return options_; }
@@ -122,35 +114,29 @@ class FilterState {
 
   /// Clones the camera's pose into the state, fully correlated.
   AnchorPoseId AddAnchor();
-  /// Starts a feature in a clone. InvalidArgument: unknown anchor, id not
-  /// rising, numbers not usable.
+  /// Starts a feature in a clone. InvalidArgument: unknown anchor, id not rising, numbers not
+  /// usable.
   absl::Status AddFeature(AnchorPoseId anchor, const FeatureBirth& birth);
-  /// Removes features (unknown ids are ignored), and the clones that then carry
-  /// none.
+  /// Removes features (unknown ids are ignored), and the clones that then carry none.
   void Remove(std::span<const FeatureId> ids);
 
-  /// Pixel of a feature at the current camera pose, with its uncertainty;
-  /// nothing if not in view.
+  /// Pixel of a feature at the current camera pose, with its uncertainty; nothing if not in view.
   std::optional<PredictedPixel> Predicted(const CameraModel& camera, FeatureId id) const;
   std::optional<PredictedPixel> Predicted(const CameraModel& camera,
                                           const Eigen::Vector3d& known_point) const;
 
-  /// Corrects everything with the observations of one frame (joint update,
-  /// slam-spec 2).
+  /// Corrects everything with the observations of one frame (joint update, slam-spec 2).
   ///
-  /// n = dim(), m = 2 * observations.size(): O(n^2 m). Measurements are
-  /// linearised at `linearisation`, which may be a better pose than the
-  /// predicted one (iterated update with that as its only iterate). Uses the
-  /// information form when m > n. On error nothing changes:
-  ///   InvalidArgument     unknown feature, or one not in view from
-  ///   `linearisation` FailedPrecondition  innovation covariance not positive
-  ///   definite
+  /// n = dim(), m = 2 * observations.size(): O(n^2 m). Measurements are linearised at
+  /// `linearisation`, which may be a better pose than the predicted one (iterated update with that
+  /// as its only iterate). Uses the information form when m > n. On error nothing changes:
+  ///   InvalidArgument     unknown feature, or one not in view from `linearisation`
+  ///   FailedPrecondition  innovation covariance not positive definite
   absl::StatusOr<UpdateReport> Update(const CameraModel& camera,
                                       std::span<const Observation> observations,
                                       const Rigid3& linearisation);
 
-  /// Removes features whose inverse range is negative by two sigma; returns
-  /// them.
+  /// Removes features whose inverse range is negative by two sigma; returns them.
   std::vector<FeatureId> RemoveBehind();
 
  private:
@@ -186,9 +172,8 @@ class FilterState {
   absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report);
   absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report);
   void Correct(const Eigen::VectorXd& error);
-  /// Carries the covariance along when estimates move by `step`: a scale error
-  /// then moves them by what they are now, not by what they were (README:
-  /// scale).
+  /// Carries the covariance along when estimates move by `step`: a scale error then moves them by
+  /// what they are now, not by what they were (README: scale).
   void CarryScale(const Eigen::VectorXd& step);
 
   FilterOptions options_;
