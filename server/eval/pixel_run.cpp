@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "server/eval/registration.hpp"
@@ -12,6 +13,7 @@ namespace {
 
 constexpr double kClickBorder_px = 40.0;  // nobody clicks the very edge
 constexpr int kClickTries = 50;
+constexpr double kOtherObject_m = 0.03;
 constexpr double kMinDistance_m = 0.25;
 
 const char* ToString(AnchorState state) {
@@ -163,6 +165,19 @@ void PixelRun::ClickIfDue(FrameId now, PixelRunTotals& totals) {
 
 std::optional<PixelRun::SurfacePixel> PixelRun::PickSurface(FrameId frame) {
   const CameraModel& camera = *source_->info().camera;
+  // People click objects: one of those in view that were not clicked yet, else any surface.
+  std::vector<SurfacePixel> objects;
+  for (const SimObject& object : source_->Truth(frame).objects) {
+    if (!object.visible || !object.pixel || !camera.InImage(*object.pixel, kClickBorder_px))
+      continue;
+    const bool again = std::any_of(clicked_.begin(), clicked_.end(), [&](const Clicked& before) {
+      return (before.true_point - object.point_in_world).norm() < kOtherObject_m;
+    });
+    if (!again) objects.push_back({*object.pixel, object.point_in_world});
+  }
+  if (!objects.empty()) {
+    return objects[std::uniform_int_distribution<std::size_t>(0, objects.size() - 1)(rng_)];
+  }
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   for (int i = 0; i < kClickTries; ++i) {
     const Eigen::Vector2d pixel(
@@ -188,8 +203,8 @@ void PixelRun::CompareAnchors(const Frame& frame, const MapSnapshot& snapshot, b
       if (annotation.id == clicked.id) anchor = &annotation.anchor;
     }
     const AnchorState state = anchor != nullptr ? anchor->state : AnchorState::kStopped;
-    const bool drawn = pose_published && anchor != nullptr &&
-                       (state == AnchorState::kTracking || state == AnchorState::kProvisional);
+    const bool drawn = pose_published && anchor != nullptr && anchor->place_known &&
+                       state != AnchorState::kStopped;  // paused: hollow
     const auto error = CompareRegistration(
         *frame.camera, source_->WorldFromCamera(frame.id), clicked.true_point,
         snapshot.world_from_camera, drawn ? std::optional(anchor->point_in_world) : std::nullopt);

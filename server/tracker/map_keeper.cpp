@@ -72,6 +72,16 @@ bool MapKeeper::Wants(const FrameMatches& matches, const FilterState&) const {
   return missing >= options_.features_in_view / 8 && frames_since_growth_ >= kFramesBetweenGrowth;
 }
 
+std::optional<Eigen::Vector2d> MapKeeper::CornerNear(const ImagePyramid& pyramid,
+                                                     const Eigen::Vector2d& pixel, int radius_px) {
+  const cv::Rect region(static_cast<int>(std::lround(pixel.x())) - radius_px,
+                        static_cast<int>(std::lround(pixel.y())) - radius_px, 2 * radius_px + 1,
+                        2 * radius_px + 1);
+  detector_.Detect(pyramid, region, {}, 1, corners_);
+  if (corners_.empty()) return std::nullopt;
+  return corners_.front().pixel;
+}
+
 std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
                                           const DepthGuess& depth, AnchorPoseId anchor,
                                           const FrameMatcher& matcher, FilterState& filter,

@@ -35,6 +35,9 @@ class MapKeeper {
   int Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
            const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
            FilterState& filter, LandmarkMap& map, std::mt19937_64& random);
+  /// The best corner at most `radius_px` from `pixel`, if there is one: what can be tracked.
+  std::optional<Eigen::Vector2d> CornerNear(const ImagePyramid& pyramid,
+                                            const Eigen::Vector2d& pixel, int radius_px);
   /// Starts one feature at a pixel; nothing if there is no texture or no room for a patch.
   std::optional<FeatureId> Plant(const Frame& frame, const Eigen::Vector2d& pixel,
                                  const DepthGuess& depth, AnchorPoseId anchor,

@@ -106,6 +106,17 @@ absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
       !std::isfinite(depth_sigma_m)) {
     return absl::InvalidArgumentError("feature: depth and its sigma must be above 0");
   }
+  if (!pixel.allFinite() || !clicked_frame.camera || !clicked_frame.camera->InImage(pixel)) {
+    return absl::InvalidArgumentError("feature: the pixel is not in the picture");
+  }
+  // An edge or a plain surface would slide and end at a depth of its own making.
+  constexpr int kCornerRadius_px = 4;  // inside the patch that is tracked
+  ImagePyramid clicked_pyramid;
+  if (const absl::Status built = clicked_pyramid.Build(clicked_frame.grey); !built.ok())
+    return built;
+  if (!keeper_.CornerNear(clicked_pyramid, pixel, kCornerRadius_px)) {
+    return absl::NotFoundError("feature: no corner to track at this pixel");
+  }
   const auto patch = CutPatch(clicked_frame.grey, pixel, clicked_frame.camera);
   if (!patch.ok()) return patch.status();
   const CameraModel& camera = *last_frame_.camera;
