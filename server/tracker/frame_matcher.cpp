@@ -139,7 +139,9 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   const double sigma = PixelSigma(camera, expected->pixel);
   const Eigen::Matrix2d spread = expected->d_pose * pose_covariance * expected->d_pose.transpose() +
                                  expected->covariance + sigma * sigma * Eigen::Matrix2d::Identity();
-  const SearchResult result = searcher_.Find(pyramid, warped_, centre, spread);
+  // After blind frames the ellipse outgrows what can be searched: look in its middle then.
+  const double shrink = std::min(1.0, kWidest_px * kWidest_px / std::max(1e-9, spread.trace()));
+  const SearchResult result = searcher_.Find(pyramid, warped_, centre, shrink * spread);
   if (result.status == SearchStatus::kTooUncertain || result.status == SearchStatus::kOutside ||
       result.status == SearchStatus::kBadInput) {
     return;
@@ -185,7 +187,8 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
     searched += in_view[order[k]].searched ? 1 : 0;
   }
   matches.pose = Solve(camera, prior, in_view, random);
-  matches.surprised = matches.pose.inliers < std::max(4, searched / 3);
+  // Nothing to search is no surprise: widening would only make it harder to find.
+  matches.surprised = searched >= 8 && matches.pose.inliers < std::max(4, searched / 3);
   const bool known = matches.pose.inliers >= 3;
   const Rigid3 pose = known ? matches.pose.world_from_camera : prior.world_from_camera;
   const Matrix6d spread = known ? matches.pose.covariance : prior.covariance;

@@ -138,10 +138,12 @@ void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
   const MotionNoise noise{options_.acceleration_sigma_m_s2,
                           options_.angular_acceleration_sigma_rad_s2};
   const CameraMotion before = filter_.camera();
+  // Once: in a row of blind frames every widening would make the next search more hopeless.
+  const bool followed = matches_.accepted >= options_.coasting_below;
   filter_.Predict(dt, noise);
   times_.predict_ms = watch.Lap_ms();
   matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
-  if (matches_.surprised) {
+  if (matches_.surprised && followed) {
     const MotionNoise wild{kSurprise * noise.acceleration_m_s2,
                            kSurprise * noise.angular_acceleration_rad_s2};
     filter_.Inflate(LineariseMotion(before, before.world_from_camera.rotation, dt, wild).q);

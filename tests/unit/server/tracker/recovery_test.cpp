@@ -1,0 +1,135 @@
+// The tracker on a recording whose lens is covered, or whose view jumps.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "server/capture/dataset.hpp"
+#include "server/tracker/tracker.hpp"
+
+namespace saccade {
+namespace {
+
+using Snapshot = std::shared_ptr<const MapSnapshot>;
+
+/// Frames of a recording, handed out in any order at 30 Hz.
+class Player {
+ public:
+  explicit Player(const std::filesystem::path& folder, std::uint64_t end) {
+    SourceOptions options;
+    options.end_frame = end;
+    auto source = OpenDataset(folder, options);
+    if (!source.ok()) return;
+    info_ = (*source)->info();
+    for (auto frame = (*source)->Next(); frame.ok() && *frame; frame = (*source)->Next()) {
+      frames_.push_back(**frame);
+    }
+    auto created = Tracker::Create(info_, TrackerOptions());
+    if (created.ok()) tracker_ = *std::move(created);
+  }
+  bool ready() const { return tracker_ != nullptr && !frames_.empty(); }
+
+  Snapshot Show(std::size_t index) { return Show(frames_[index]); }
+  Snapshot ShowBlack() {
+    Frame frame = frames_.front();
+    frame.grey = cv::Mat::zeros(frame.grey.size(), CV_8UC1);
+    return Show(frame);
+  }
+  Snapshot ShowNoise(cv::RNG& random) {
+    Frame frame = frames_.front();
+    frame.grey = cv::Mat(frame.grey.size(), CV_8UC1);
+    random.fill(frame.grey, cv::RNG::UNIFORM, 0, 255);
+    return Show(frame);
+  }
+  Snapshot Show(Frame frame) {
+    frame.id = next_;
+    frame.capture_time_ns = 1'000'000'000 + static_cast<Timestamp>(next_++) * 33'333'333;
+    return tracker_->Track(frame);
+  }
+  Tracker& tracker() { return *tracker_; }
+
+ private:
+  SourceInfo info_;
+  std::vector<Frame> frames_;
+  std::unique_ptr<Tracker> tracker_;
+  std::uint64_t next_ = 0;
+};
+
+class Recovery : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::filesystem::path folder =
+        std::filesystem::path(SACCADE_SOURCE_DIR) / "../shared/data/tum_fr1_xyz";
+    if (!std::filesystem::exists(folder)) GTEST_SKIP() << "data set tum_fr1_xyz is not here";
+    player_ = std::make_unique<Player>(folder, 330);
+    ASSERT_TRUE(player_->ready());
+    for (std::size_t k = 0; k < 300; ++k) poses_.push_back(player_->Show(k)->world_from_camera);
+  }
+
+  std::unique_ptr<Player> player_;
+  std::vector<Rigid3> poses_;
+};
+
+TEST_F(Recovery, AfterTheViewJumpsBackToAMappedPlace) {
+  Snapshot last;
+  int tracked_after = -1;
+  for (std::size_t k = 0; k < 45; ++k) {
+    last = player_->Show(150 + k);
+    if (tracked_after < 0 && last->status == TrackingStatus::kTracking && k > 3) {
+      tracked_after = static_cast<int>(k);
+      EXPECT_LT((last->world_from_camera.translation - poses_[150 + k].translation).norm(), 0.05)
+          << "never at a wrong place";
+    }
+  }
+  ASSERT_EQ(last->status, TrackingStatus::kTracking);
+  EXPECT_LT((last->world_from_camera.translation - poses_[194].translation).norm(), 0.04);
+  EXPECT_LT(RotationAngle(last->world_from_camera, poses_[194]), 0.03);
+}
+
+TEST_F(Recovery, AfterTheLensWasCovered) {
+  Snapshot last;
+  for (int k = 0; k < 40; ++k) last = player_->ShowBlack();
+  EXPECT_EQ(last->status, TrackingStatus::kLost);
+  EXPECT_FALSE(last->advice.empty());
+  const std::size_t known = last->features.size();
+  for (std::size_t k = 0; k < 20; ++k) last = player_->Show(285 + k / 2);
+  ASSERT_EQ(last->status, TrackingStatus::kTracking);
+  EXPECT_GE(last->features.size() + 5, known);  // the map was frozen, not thrown away
+  EXPECT_LT((last->world_from_camera.translation - poses_[294].translation).norm(), 0.04);
+}
+
+TEST_F(Recovery, ShortCoverIsCoastedThrough) {
+  Snapshot last;
+  for (int k = 0; k < 4; ++k) last = player_->ShowBlack();
+  EXPECT_EQ(last->status, TrackingStatus::kCoasting);
+  for (std::size_t k = 0; k < 6; ++k) last = player_->Show(300 + k);
+  EXPECT_EQ(last->status, TrackingStatus::kTracking);
+}
+
+TEST_F(Recovery, ForeignPicturesAreNeverTakenForTheMap) {
+  cv::RNG random(5);
+  Snapshot last;
+  for (int k = 0; k < 60; ++k) {
+    last = player_->ShowNoise(random);
+    EXPECT_NE(last->status, TrackingStatus::kRelocalising);
+    if (k > 20) {
+      EXPECT_EQ(last->status, TrackingStatus::kLost);
+    }
+  }
+}
+
+TEST_F(Recovery, ResetStartsANewMap) {
+  const Snapshot before = player_->Show(300);
+  player_->tracker().Reset();
+  const Snapshot after = player_->Show(301);
+  EXPECT_EQ(after->map_generation, before->map_generation + 1);
+  EXPECT_GT(after->map_revision, before->map_revision);
+  EXPECT_LT(after->world_from_camera.translation.norm(), 1e-9);
+  Snapshot last;
+  for (std::size_t k = 302; k < 325; ++k) last = player_->Show(k);
+  EXPECT_EQ(last->status, TrackingStatus::kTracking);
+}
+
+}  // namespace
+}  // namespace saccade
