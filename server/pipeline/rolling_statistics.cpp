@@ -1,6 +1,7 @@
 #include "server/pipeline/rolling_statistics.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace saccade {
@@ -10,7 +11,7 @@ namespace {
 double Percentile(std::vector<double>& values, double fraction) {
   if (values.empty()) return 0.0;
   const auto rank =
-      static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1) + 0.5);
+      static_cast<std::ptrdiff_t>(std::lround(fraction * static_cast<double>(values.size() - 1)));
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   return values[static_cast<std::size_t>(rank)];
 }
