@@ -5,16 +5,12 @@
 #include <optional>
 #include <string>
 
+#include "server/mount/mount_angles.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/scene/map_snapshot.hpp"
 #include "shared/time/timestamp.hpp"
 
 namespace saccade {
-
-/// Joint angles of the mount at mid-exposure [rad].
-struct MountAngles {
-  double pan_rad = 0, elevation_rad = 0, cyclotorsion_rad = 0;
-};
 
 /// One picture on its way through the pipeline. Immutable once captured; images are shared.
 struct Frame {
@@ -25,6 +21,7 @@ struct Frame {
   cv::Mat grey;                    // CV_8UC1, never empty
   cv::Mat color;                   // CV_8UC3 BGR, or empty if the source is grey
   std::shared_ptr<const CameraModel> camera;
+  /// By the encoders, at capture_time_ns; absent: the camera is fixed, or its encoders are silent.
   std::optional<MountAngles> mount;
 };
 

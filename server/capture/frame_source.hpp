@@ -10,6 +10,7 @@
 
 #include "server/capture/frame.hpp"
 #include "server/capture/target.hpp"
+#include "server/mount/mount_model.hpp"
 
 namespace saccade {
 
@@ -20,6 +21,7 @@ struct SourceInfo {
   std::optional<Target> target;    // known points, if the place has them
   std::optional<StartPose> start;  // nominal first pose
   std::optional<std::uint64_t> frame_count;
+  std::shared_ptr<const MountModel> mount;  // what turns the camera; null: fixed to the wearer
 };
 
 /// Where frames come from. One thread calls Next(); the source paces itself only if it is live or

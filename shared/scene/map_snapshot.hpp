@@ -59,6 +59,7 @@ struct MapSnapshot {
   std::vector<FeatureSnapshot> features;
   int attempted = 0;  // features searched for in this frame
   int matched = 0;    // accepted by the filter
+  double searched_px2 = 0;  // area of all ellipses searched in this frame; 0: not counted
   /// Rises whenever the map changed other than by a filter update: reset, relocalisation, loop.
   std::uint64_t map_revision = 0;
   /// Changes when the map is thrown away (reset): ids and coordinates before it mean nothing now.
