@@ -225,7 +225,8 @@ absl::StatusOr<MapExport> Connection::ExportMap() {
 }
 
 absl::StatusOr<std::uint64_t> Connection::ResetMap() {
-  auto response = impl_->Call(*impl_->map_, &v1::MapService::Stub::Reset, v1::ResetMapRequest());
+  auto response =
+      impl_->CallInSession(*impl_->map_, &v1::MapService::Stub::Reset, v1::ResetMapRequest());
   if (!response.ok()) return response.status();
   return response->map_generation();
 }

@@ -173,6 +173,9 @@ void Engine::Execute(Command command) {
           });
         } else if constexpr (std::is_same_v<T, UndoChange>) {
           one.redo ? book_->Redo(one.owner, one.done) : book_->Undo(one.owner, one.done);
+        } else if constexpr (std::is_same_v<T, ForgetSession>) {
+          book_->ForgetSession(one.owner);
+          one.done(absl::OkStatus());
         } else {
           ResetTracker(one);
         }

@@ -41,9 +41,14 @@ struct UndoChange {
 struct ResetMap {
   Done<std::uint64_t> done;  // the new map_generation
 };
+/// The session is gone: what it did can no longer be undone, and its history is dropped.
+struct ForgetSession {
+  std::string owner;
+  DoneEmpty done = [](const absl::Status&) {};
+};
 
-using Command =
-    std::variant<CreateAnnotation, UpdateAnnotation, DeleteAnnotation, UndoChange, ResetMap>;
+using Command = std::variant<CreateAnnotation, UpdateAnnotation, DeleteAnnotation, UndoChange,
+                             ResetMap, ForgetSession>;
 
 /// Answers a command that will not be carried out.
 void Fail(const Command& command, const absl::Status& status);

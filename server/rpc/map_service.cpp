@@ -58,18 +58,23 @@ grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
 }
 
 grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context,
-                                            const v1::ResetMapRequest* /*request*/,
+                                            const v1::ResetMapRequest* request,
                                             v1::ResetMapResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::Status queued = backend_.Submit(
-      ResetMap{[reactor, response](const absl::StatusOr<std::uint64_t>& generation) {
-        if (generation.ok()) response->set_map_generation(*generation);
-        Audit("Map.Reset", "", generation.status());
-        reactor->Finish(ToGrpc(generation.status()));
-      }});
-  if (!queued.ok()) {
-    Audit("Map.Reset", "", queued);
-    reactor->Finish(ToGrpc(queued));
+  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  const std::string id = session.ok() ? session->id : "";
+  absl::Status status = session.status();
+  if (status.ok()) {
+    status = backend_.Submit(
+        ResetMap{[reactor, response, id](const absl::StatusOr<std::uint64_t>& generation) {
+          if (generation.ok()) response->set_map_generation(*generation);
+          Audit("Map.Reset", id, generation.status());
+          reactor->Finish(ToGrpc(generation.status()));
+        }});
+  }
+  if (!status.ok()) {
+    Audit("Map.Reset", id, status);
+    reactor->Finish(ToGrpc(status));
   }
   return reactor;
 }

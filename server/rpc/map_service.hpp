@@ -2,14 +2,17 @@
 
 #include "saccade/v1/map.grpc.pb.h"
 #include "server/rpc/backend.hpp"
+#include "server/rpc/session_table.hpp"
 #include "server/rpc/stream_hub.hpp"
 
 namespace saccade {
 
-/// The map at large. Save, Load and List answer UNIMPLEMENTED. Handlers never block.
+/// The map at large. Reset is for those who may edit. Save, Load and List answer UNIMPLEMENTED.
+/// Handlers never block.
 class MapService final : public v1::MapService::CallbackService {
  public:
-  MapService(Backend& backend, StreamHub& hub) : backend_(backend), hub_(hub) {}
+  MapService(Backend& backend, StreamHub& hub, SessionTable& sessions)
+      : backend_(backend), hub_(hub), sessions_(sessions) {}
 
  private:
   grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context,
@@ -24,6 +27,7 @@ class MapService final : public v1::MapService::CallbackService {
 
   Backend& backend_;
   StreamHub& hub_;
+  SessionTable& sessions_;
 };
 
 }  // namespace saccade

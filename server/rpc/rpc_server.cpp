@@ -40,10 +40,12 @@ class RpcServer::Impl {
  public:
   Impl(const RpcServerOptions& options, Backend& backend, StreamHub& hub)
       : hub_(hub),
-        sessions_(options.max_sessions),
+        sessions_(
+            options.max_sessions,
+            [&backend](const std::string& id) { return backend.Submit(ForgetSession{id}).ok(); }),
         session_service_(backend, hub, sessions_),
         annotation_service_(backend, hub, sessions_),
-        map_service_(backend, hub) {}
+        map_service_(backend, hub, sessions_) {}
   ~Impl() { Stop(std::chrono::milliseconds(500)); }
 
   absl::Status Start(const RpcServerOptions& options) {

@@ -43,7 +43,9 @@ void SessionTable::MakeRoom() {
   const auto oldest = std::min_element(
       sessions_.begin(), sessions_.end(),
       [](const auto& a, const auto& b) { return a.second.used_ns < b.second.used_ns; });
+  gone_.push_back(oldest->first);
   sessions_.erase(oldest);
+  std::erase_if(gone_, [this](const std::string& id) { return !on_gone_ || on_gone_(id); });
 }
 
 absl::StatusOr<Session> SessionTable::Find(const std::string& session_id) {

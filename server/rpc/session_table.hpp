@@ -4,8 +4,11 @@
 #include <absl/status/statusor.h>
 
 #include <cstddef>
+#include <functional>
 #include <mutex>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "saccade/v1/session.pb.h"
 #include "shared/time/timestamp.hpp"
@@ -21,7 +24,13 @@ struct Session {
 /// Who joined. Bounded: above `max_sessions` the one unused for longest goes. Thread safe.
 class SessionTable {
  public:
-  explicit SessionTable(std::size_t max_sessions = 1000) : max_sessions_(max_sessions) {}
+  /// Told the id of each session that goes, so that what is kept for it elsewhere goes too; false:
+  /// not now, and it is told again with the next one. Called from Join(); must not block or call
+  /// back.
+  using OnGone = std::function<bool(const std::string& session_id)>;
+
+  explicit SessionTable(std::size_t max_sessions = 1000, OnGone on_gone = nullptr)
+      : max_sessions_(max_sessions), on_gone_(std::move(on_gone)) {}
 
   /// InvalidArgument names the field.
   absl::StatusOr<Session> Join(const v1::JoinRequest& request);
@@ -40,7 +49,9 @@ class SessionTable {
   void MakeRoom();
 
   const std::size_t max_sessions_;
+  const OnGone on_gone_;
   std::mutex mutex_;
+  std::vector<std::string> gone_;  // not told yet
   absl::flat_hash_map<std::string, Slot> sessions_;
 };
 

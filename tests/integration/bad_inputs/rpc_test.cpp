@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "saccade/v1/annotation.grpc.pb.h"
+#include "saccade/v1/map.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 #include "tests/integration/bad_inputs/table.hpp"
 #include "tests/integration/support/small_dataset.hpp"
@@ -208,6 +209,17 @@ TEST_F(BadRpc, WhoIsNotKnownOrNotAllowedIsRefused) {
     Row("rpc", "Undo: nothing done yet", Text(status),
         status.error_code() == StatusCode::FAILED_PRECONDITION ||
             status.error_code() == StatusCode::NOT_FOUND);
+  }
+  for (const bool viewer : {true, false}) {
+    grpc::ClientContext context;
+    v1::ResetMapRequest request;
+    if (viewer) request.set_session_id(Join(v1::ROLE_VIEWER));
+    v1::ResetMapResponse response;
+    const grpc::Status status =
+        v1::MapService::NewStub(channel_)->Reset(&context, request, &response);
+    Row("rpc", viewer ? "Map.Reset by a viewer" : "Map.Reset without a session", Text(status),
+        status.error_code() ==
+            (viewer ? StatusCode::PERMISSION_DENIED : StatusCode::INVALID_ARGUMENT));
   }
 }
 

@@ -266,13 +266,55 @@ TEST(Rpc, TheMapIsExportedAndReset) {
   }
   {
     grpc::ClientContext context;
+    v1::ResetMapRequest request;
+    request.set_session_id(client.session_id());
     v1::ResetMapResponse response;
-    ASSERT_TRUE(client.map().Reset(&context, {}, &response).ok());
+    ASSERT_TRUE(client.map().Reset(&context, request, &response).ok());
     EXPECT_EQ(response.map_generation(), 1u);
   }
   grpc::ClientContext context;
   v1::SaveMapResponse saved;
   EXPECT_EQ(client.map().Save(&context, {}, &saved).error_code(), grpc::StatusCode::UNIMPLEMENTED);
+}
+
+TEST(Rpc, WhoMayNotEditMayNotResetTheMap) {
+  InProcessServer server;
+  TestClient viewer(server.address(), v1::ROLE_VIEWER);
+  TestClient wearer(server.address(), v1::ROLE_WEARER);
+  FirstFrame(wearer);
+  const auto reset = [&](const std::string& session_id, v1::ResetMapResponse& response) {
+    grpc::ClientContext context;
+    v1::ResetMapRequest request;
+    request.set_session_id(session_id);
+    return wearer.map().Reset(&context, request, &response);
+  };
+  v1::ResetMapResponse response;
+  EXPECT_EQ(reset(viewer.session_id(), response).error_code(), grpc::StatusCode::PERMISSION_DENIED);
+  const grpc::Status without = reset("", response);
+  EXPECT_EQ(without.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(without.error_message(), StartsWith("session_id"));
+  EXPECT_EQ(reset(Uuid(7), response).error_code(), grpc::StatusCode::NOT_FOUND);
+  ASSERT_TRUE(reset(wearer.session_id(), response).ok());
+  EXPECT_EQ(response.map_generation(), 1u) << "none of the refused ones did it";
+}
+
+TEST(Rpc, TheHistoryOfASessionGoesWithIt) {
+  testing::InProcessOptions options;
+  options.max_sessions = 2;
+  InProcessServer server(options);
+  TestClient client(server.address());
+  v1::CreateAnnotationResponse created;
+  ASSERT_TRUE(client.Create(client.CubeAt(100, 100, FirstFrame(client)), Uuid(1), created).ok());
+  TestClient second(server.address()), third(server.address());  // the table holds two
+  // Past the services, which refuse the session's id by now: is anything still kept for it?
+  std::promise<absl::StatusOr<std::string>> undone;
+  ASSERT_TRUE(server.engine()
+                  .Submit(UndoChange{client.session_id(), false,
+                                     [&undone](absl::StatusOr<std::string> answer) {
+                                       undone.set_value(std::move(answer));
+                                     }})
+                  .ok());
+  EXPECT_EQ(undone.get_future().get().status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
 TEST(Rpc, AFullMailboxRefuses) {

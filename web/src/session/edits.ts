@@ -2,7 +2,7 @@ import { create, type MessageInitShape } from '@bufbuild/protobuf';
 import { AnnotationDraftSchema, AnnotationTargetSchema } from '../gen/saccade/v1/annotation_pb';
 import { PixelSchema, Vector3Schema } from '../gen/saccade/v1/geometry_pb';
 import type { Vec3 } from '../geometry/vec3';
-import { describeError } from '../transport/errors';
+import { describeError, isGone } from '../transport/errors';
 import { pbShapes, toAnnotation } from './convert';
 import type { Session } from './session';
 import type { Annotation, Shape, Target } from './types';
@@ -11,6 +11,8 @@ export interface Placement {
   readonly shape: Shape;
   readonly text: string;
   readonly target: Target;
+  /** Takes its place where the server no longer keeps the frame that `target` names. */
+  readonly later?: Target | undefined;
   /** Where this page thinks it will land, shown until the server answers. */
   readonly guessInWorld: Vec3 | undefined;
 }
@@ -35,12 +37,16 @@ export class Edits {
       sizeM: 0.05,
     });
     try {
-      const draft = create(AnnotationDraftSchema, {
-        shape: pbShapes[placement.shape],
-        text: placement.text,
-        target: toTarget(placement.target),
+      const ask = (target: Target) => {
+        const { shape, text } = placement;
+        const fields = { shape: pbShapes[shape], text, target: toTarget(target) };
+        const draft = create(AnnotationDraftSchema, fields);
+        return clients.annotations.create({ requestId, sessionId, draft }, TIMEOUT);
+      };
+      const reply = await ask(placement.target).catch((error: unknown) => {
+        if (placement.later && isGone(error)) return ask(placement.later);
+        throw error;
       });
-      const reply = await clients.annotations.create({ requestId, sessionId, draft }, TIMEOUT);
       if (!reply.annotation) throw new EditError('the server sent no annotation back');
       const annotation = toAnnotation(reply.annotation);
       annotations.put(annotation);
@@ -93,8 +99,9 @@ export class Edits {
   }
 
   async resetMap(): Promise<void> {
+    const { clients, sessionId } = this.session;
     try {
-      await this.session.clients.map.reset({}, TIMEOUT);
+      await clients.map.reset({ sessionId }, TIMEOUT);
     } catch (error) {
       throw asEditError(error);
     }

@@ -22,6 +22,9 @@ export function isRefusal(error: unknown): boolean {
   return code === Code.InvalidArgument || code === Code.PermissionDenied;
 }
 
+/** True where what was named is not kept (any more). */
+export const isGone = (error: unknown): boolean => ConnectError.from(error).code === Code.NotFound;
+
 function isNetworkFailure(error: ConnectError): boolean {
   return /fetch|network|load failed/i.test(error.rawMessage);
 }

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <string>
+#include <vector>
 
 #include "shared/wire/from_proto.hpp"
 
@@ -55,6 +57,26 @@ TEST(SessionTable, IsBoundedAndForgetsTheUnusedFirst) {
   ASSERT_TRUE(sessions.Join({}).ok());
   EXPECT_TRUE(sessions.Find(first).ok());
   EXPECT_FALSE(sessions.Find(second).ok());
+}
+
+TEST(SessionTable, TellsWhoIsGoneAndTellsItAgainUntilItIsTaken) {
+  std::vector<std::string> told;
+  bool takes = false;
+  SessionTable sessions(2, [&](const std::string& id) {
+    told.push_back(id);
+    return takes;
+  });
+  const std::string first = sessions.Join({})->id;
+  const std::string second = sessions.Join({})->id;
+  EXPECT_TRUE(told.empty());
+  ASSERT_TRUE(sessions.Join({}).ok());
+  EXPECT_THAT(told, ::testing::ElementsAre(first));
+  takes = true;
+  ASSERT_TRUE(sessions.Join({}).ok());
+  EXPECT_THAT(told, ::testing::ElementsAre(first, first, second));
+  const std::size_t so_far = told.size();
+  ASSERT_TRUE(sessions.Join({}).ok());
+  EXPECT_EQ(told.size(), so_far + 1) << "what was taken is not told again";
 }
 
 }  // namespace

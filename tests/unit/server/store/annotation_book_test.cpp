@@ -130,6 +130,16 @@ TEST_F(BookTest, UndoIsDurable) {
   EXPECT_THAT(*book_->Latest(), IsEmpty());
 }
 
+TEST_F(BookTest, AForgottenSessionsChangesStayAndCannotBeUndone) {
+  Start();
+  ASSERT_TRUE(Create("r1").ok());
+  book_->ForgetSession("s");
+  Answer<std::string> answer;
+  book_->Undo("s", answer.Take());
+  EXPECT_EQ(answer.Get().status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(*book_->Latest(), SizeIs(1));
+}
+
 TEST_F(BookTest, NothingClaimsToBeSavedOnAFullDisk) {
   AnnotationStore::Options options;
   options.max_bytes = 20 * 4096;
