@@ -11,9 +11,9 @@ namespace saccade::cli {
 namespace {
 
 std::string Line(const Annotation& annotation) {
-  return absl::StrCat(Word(annotation.shape), " ", annotation.id, ": ",
-                      Word(annotation.anchor.state), ", ", ErrorText(annotation.anchor), ", ",
-                      PointText(annotation.anchor.point_in_world, false));
+  const Anchor& anchor = annotation.anchor;
+  return absl::StrCat(Word(annotation.shape), " ", annotation.id, ": ", Word(anchor.state), ", ",
+                      ErrorText(anchor), anchor.place_known ? ", " + PlaceText(anchor) : "");
 }
 
 std::string FullText(const Annotation& annotation) {
@@ -27,8 +27,7 @@ std::string FullText(const Annotation& annotation) {
        {"state",
         absl::StrCat(Word(anchor.state), anchor.reason.empty() ? "" : ": ", anchor.reason)},
        {"error", ErrorText(anchor)},
-       {"point",
-        absl::StrCat(PointText(anchor.point_in_world, false), ", by ", Word(anchor.method))},
+       {"point", absl::StrCat(PlaceText(anchor), ", by ", Word(anchor.method))},
        {"pixel", anchor.pixel ? absl::StrFormat("%.1f,%.1f", anchor.pixel->x(), anchor.pixel->y())
                               : "out of view"}});
 }

@@ -213,10 +213,15 @@ json ToJson(const Annotation& annotation) {
               {"anchor",
                {{"state", Word(anchor.state)},
                 {"method", Word(anchor.method)},
-                {"point_in_world_m", Numbers(anchor.point_in_world)},
-                {"covariance_in_world_m2_upper", Upper(anchor.covariance_in_world)},
-                {"error_mm", 1e3 * anchor.error_m},
+                {"point_in_world_m", nullptr},
+                {"covariance_in_world_m2_upper", nullptr},
+                {"error_mm", nullptr},
                 {"reason", anchor.reason}}}};
+  if (anchor.place_known) {  // else they are of another map
+    out["anchor"]["point_in_world_m"] = Numbers(anchor.point_in_world);
+    out["anchor"]["covariance_in_world_m2_upper"] = Upper(anchor.covariance_in_world);
+    out["anchor"]["error_mm"] = 1e3 * anchor.error_m;
+  }
   out["anchor"]["error_px"] = anchor.error_px ? json(*anchor.error_px) : json(nullptr);
   out["anchor"]["pixel"] = anchor.pixel ? Numbers(*anchor.pixel) : json(nullptr);
   return out;
@@ -250,7 +255,12 @@ std::string PointText(const Eigen::Vector3d& point, bool metric) {
                          metric ? " m" : "");
 }
 
+std::string PlaceText(const Anchor& anchor) {
+  return anchor.place_known ? PointText(anchor.point_in_world, false) : "place not known";
+}
+
 std::string ErrorText(const Anchor& anchor) {
+  if (!anchor.place_known) return "place not known";
   const std::string mm = absl::StrFormat("%.0f mm", 1e3 * anchor.error_m);
   if (!anchor.error_px) return absl::StrCat("out of view ", mm);
   return absl::StrFormat("%.1f px %s", *anchor.error_px, mm);

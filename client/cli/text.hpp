@@ -30,7 +30,9 @@ nlohmann::json ToJson(const net::WatchEvent& event);
 
 /// "x 0.123 y -0.045 z 1.200 m"; of a world without scale, without the unit.
 std::string PointText(const Eigen::Vector3d& point, bool metric);
-/// "0.8 px 3 mm", or "out of view 3 mm".
+/// The anchor's point, or "place not known" (in this map).
+std::string PlaceText(const Anchor& anchor);
+/// "0.8 px 3 mm", "out of view 3 mm", or "place not known".
 std::string ErrorText(const Anchor& anchor);
 /// Columns padded to the same width, two blanks apart, one row a line.
 std::string Table(const std::vector<std::vector<std::string>>& rows);

@@ -35,6 +35,23 @@ TEST(Json, AnnotationOutOfViewHasNoPixel) {
   EXPECT_EQ(json["anchor"]["pixel"], nlohmann::json::array({10.0, 20.0}));
 }
 
+TEST(Json, AnAnchorWhosePlaceIsNotKnownHasNoPoint) {
+  Annotation annotation;
+  annotation.anchor.state = AnchorState::kPaused;
+  annotation.anchor.point_in_world = {1, 2, 3};  // of another map
+  annotation.anchor.error_m = 0.003;
+  annotation.anchor.place_known = false;
+  const nlohmann::json anchor = ToJson(annotation)["anchor"];
+  for (const char* name : {"point_in_world_m", "covariance_in_world_m2_upper", "error_mm"}) {
+    ASSERT_TRUE(anchor.contains(name)) << name;
+    EXPECT_TRUE(anchor[name].is_null()) << name;
+  }
+  EXPECT_EQ(PlaceText(annotation.anchor), "place not known");
+  EXPECT_EQ(ErrorText(annotation.anchor), "place not known");
+  annotation.anchor.place_known = true;
+  EXPECT_EQ(PlaceText(annotation.anchor), "x 1.000 y 2.000 z 3.000");
+}
+
 TEST(Json, PoseHasItsQuaternionInWireOrder) {
   MapSnapshot pose;
   pose.world_from_camera.rotation = Eigen::Quaterniond(0.5, 0.1, 0.2, 0.3);  // w x y z
