@@ -15,7 +15,7 @@
 
 #include "saccade/v1/session.grpc.pb.h"
 #include "shared/time/timestamp.hpp"
-#include "tests/integration/stream/h264_sink.hpp"
+#include "tests/support/h264/h264_reader.hpp"
 
 namespace saccade::testing {
 namespace {
@@ -120,7 +120,7 @@ class Probe {
   }
 
   void TakeUnit(const v1::AccessUnit& unit, Timestamp arrived_ns) {
-    const bool decoded = sink_.Decode(unit.data());
+    const bool decoded = !reader_.DecodeLuma(unit.data()).empty();
     const Timestamp decoded_ns = MonotonicNow() + offset_ns_;
     ++report_.units;
     if (!decoded) ++report_.undecodable;
@@ -153,7 +153,7 @@ class Probe {
   Timestamp offset_ns_ = 0, resumed_ns_ = 0;
   std::uint64_t sequence_ = 0;
   std::optional<std::uint64_t> last_frame_;
-  H264Sink sink_;
+  H264Reader reader_;
   Report report_;
 };
 

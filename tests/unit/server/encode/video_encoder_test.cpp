@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/encode/i420.hpp"
-#include "tests/unit/server/encode/h264_reader.hpp"
+#include "tests/support/h264/h264_reader.hpp"
 
 namespace saccade {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/unit/server/encode/h264_reader.hpp"
+#include "tests/support/h264/h264_reader.hpp"
 
 #include <wels/codec_api.h>
 
