@@ -94,15 +94,18 @@ std::optional<Piece> CutAtNear(const Eigen::Vector3d& a, const Eigen::Vector3d& 
 std::vector<Polyline2> ProjectPolyline(const CameraModel& camera, const Rigid3& camera_from_world,
                                        const Polyline3& points_in_world) {
   const Projector projector(camera);
+  // Once each: the end of a segment and the beginning of the next are then the same to the bit.
+  Polyline3 points;
+  points.reserve(points_in_world.size());
+  for (const Eigen::Vector3d& point : points_in_world) points.push_back(camera_from_world * point);
   std::vector<Polyline2> out;
   Polyline2 current;
   const auto close = [&out, &current] {
     if (current.size() > 1) out.push_back(std::move(current));
     current.clear();
   };
-  for (std::size_t i = 1; i < points_in_world.size(); ++i) {
-    const std::optional<Piece> piece = CutAtNear(camera_from_world * points_in_world[i - 1],
-                                                 camera_from_world * points_in_world[i]);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const std::optional<Piece> piece = CutAtNear(points[i - 1], points[i]);
     if (!piece) {
       close();
       continue;

@@ -36,11 +36,15 @@ export interface Mark {
   readonly hollow: boolean;
 }
 
+/** Its own colour as CSS; opaque, so that it can be seen, whatever the last byte is. */
+export const colourOf = ({ colorRgba }: Pick<Annotation, 'colorRgba'>): string =>
+  `#${(colorRgba >>> 8).toString(16).padStart(6, '0')}`;
+
 /** Undefined where the annotation has no place in this map. */
 export function markOf(annotation: Annotation): Mark | undefined {
-  const { anchor, id, shape, text, sizeM, inkOffsetsM, colorRgba } = annotation;
+  const { anchor, id, shape, text, sizeM, inkOffsetsM } = annotation;
   if (!anchor.pointInWorld || anchor.state === 'stopped') return undefined;
-  const colour = `#${(colorRgba >>> 8).toString(16).padStart(6, '0')}`;
+  const colour = colourOf(annotation);
   const hollow = doNotTrust(anchor);
   return { id, shape, text, sizeM, inkOffsetsM, colour, hollow, pointInWorld: anchor.pointInWorld };
 }

@@ -1,6 +1,7 @@
 // The page's drawing of annotations and the server's are held against the same file:
 // tests/golden/overlay_strokes.json. To write it anew after a deliberate change:
 //   SACCADE_UPDATE_GOLDEN=1 build/release/bin/overlay_test --gtest_filter='OverlayGolden.*'
+#include <absl/strings/str_format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -95,6 +96,8 @@ std::vector<Annotation> Annotations() {
     list[i].anchor.state = AnchorState::kTracking;
     list[i].anchor.point_in_world = points[i];
   }
+  list[0].color_rgba = 0xff8c1aff;
+  list[2].color_rgba = 0x00c8ff40;  // drawn opaque, whatever its last byte
   list[1].text = "check the oil level here, then close the lid again";
   list[4].size_m = 0.9;  // reaches round the camera of the third pose
   list[4].anchor.state = AnchorState::kPaused;
@@ -118,6 +121,9 @@ json Describe(const CameraModel& camera, const std::vector<double>& distortion) 
           {"distortion", distortion}};
 }
 
+/// As the page has it.
+std::string Css(std::uint32_t rgba) { return absl::StrFormat("#%06x", rgba >> 8); }
+
 json Describe(const std::vector<Annotation>& annotations) {
   json list = json::array();
   for (const Annotation& a : annotations) {
@@ -127,6 +133,7 @@ json Describe(const std::vector<Annotation>& annotations) {
                     {"shape", Name(a.shape)},
                     {"text", a.text},
                     {"size_m", a.size_m},
+                    {"color_rgba", a.color_rgba},
                     {"state", Name(a.anchor.state)},
                     {"point_in_world_m", Array(a.anchor.point_in_world)},
                     {"ink_offset_m", ink}});
@@ -145,6 +152,7 @@ json View(const CameraModel& camera, const std::vector<double>& distortion, cons
   for (const Stroke& stroke : marks.strokes) {
     view["strokes"].push_back({{"annotation_id", stroke.annotation_id},
                                {"hollow", stroke.hollow},
+                               {"colour", Css(stroke.color_rgba)},
                                {"points_px", Array(stroke.points_px)}});
   }
   view["labels"] = json::array();
@@ -152,7 +160,16 @@ json View(const CameraModel& camera, const std::vector<double>& distortion, cons
     view["labels"].push_back({{"annotation_id", label.annotation_id},
                               {"text", label.text},
                               {"hollow", label.hollow},
+                              {"colour", Css(label.color_rgba)},
                               {"at_px", Array(Polyline2{label.at_px})[0]}});
+  }
+  view["edge_arrows"] = json::array();
+  for (const EdgeArrow& arrow : marks.edge_arrows) {
+    view["edge_arrows"].push_back({{"annotation_id", arrow.annotation_id},
+                                   {"hollow", arrow.hollow},
+                                   {"colour", Css(arrow.color_rgba)},
+                                   {"tip_px", Array(Polyline2{arrow.tip_px})[0]},
+                                   {"direction", Array(Polyline2{arrow.direction})[0]}});
   }
   view["axes"] = json::array();
   for (const AxisStroke& axis : WorldAxes(camera, pose)) {
