@@ -1,23 +1,8 @@
-import { Session } from './session/session';
-import { createClients } from './transport/clients';
+import { recallName } from './session/name';
 import { App } from './ui/app';
-import { Player } from './ui/player';
+import { startPage } from './ui/start';
 
-const name = new URLSearchParams(location.search).get('name')?.slice(0, 60) ?? 'expert';
-const player = new Player();
-const session = new Session(
-  createClients(location.origin),
-  { role: 'expert', view: 'raw', name },
-  player,
+startPage(
+  { role: 'expert', view: 'raw', name: recallName(location.search, localStorage) },
+  (session, player) => new App(session, player),
 );
-player.attach(session);
-const app = new App(session, player);
-document.body.append(app.element);
-app.start();
-const leaving = new AbortController();
-window.addEventListener('pagehide', () => leaving.abort());
-// Back from the browser's page cache: the session was left, so begin again.
-window.addEventListener('pageshow', (event) => {
-  if (event.persisted) location.reload();
-});
-void session.run(leaving.signal);

@@ -1,21 +1,7 @@
-import { Session } from './session/session';
-import { createClients } from './transport/clients';
-import { Player } from './ui/player';
+import { startPage } from './ui/start';
 import { WearerApp } from './ui/wearer_app';
 
-const player = new Player();
-const session = new Session(
-  createClients(location.origin),
+startPage(
   { role: 'wearer', view: 'augmented', name: 'wearer' },
-  player,
+  (session, player) => new WearerApp(session, player),
 );
-player.attach(session);
-const app = new WearerApp(session, player);
-document.body.append(app.element);
-app.start();
-const leaving = new AbortController();
-window.addEventListener('pagehide', () => leaving.abort());
-window.addEventListener('pageshow', (event) => {
-  if (event.persisted) location.reload();
-});
-void session.run(leaving.signal);

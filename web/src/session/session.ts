@@ -60,12 +60,17 @@ export class Session {
   private lastEventMs = 0;
   private acknowledger: Acknowledger | undefined;
   private readonly backoff = new Backoff();
+  private attempt: AbortController | undefined;
+  private name: string;
+  private renamed = false;
 
   constructor(
     readonly clients: Clients,
     private readonly options: SessionOptions,
     private readonly pictures: PictureSink,
-  ) {}
+  ) {
+    this.name = options.name;
+  }
 
   get sessionId(): string {
     return this.joined?.sessionId ?? '';
@@ -76,6 +81,21 @@ export class Session {
     return this.link.kind === 'live';
   }
 
+  /** The name the others see, from now on: joins anew, as a name belongs to a session. */
+  rename(name: string): void {
+    if (name === this.name) return;
+    this.name = name;
+    this.renamed = true;
+    this.attempt?.abort();
+  }
+
+  /** A frame of the server's ring as PNG, without loss, as captured. */
+  async fetchPng(frameId: number): Promise<Uint8Array<ArrayBuffer>> {
+    const request = { frameId: BigInt(frameId), view: VideoView.RAW };
+    const { png } = await this.clients.session.getFrame(request, { timeoutMs: 5000 });
+    return new Uint8Array(png);
+  }
+
   requestKeyFrame(): void {
     this.acknowledger?.requestKeyFrame();
   }
@@ -84,6 +104,7 @@ export class Session {
   async run(signal: AbortSignal): Promise<void> {
     while (!signal.aborted) {
       const attempt = new AbortController();
+      this.attempt = attempt;
       const stop = (): void => attempt.abort();
       signal.addEventListener('abort', stop);
       try {
@@ -94,13 +115,22 @@ export class Session {
           this.link = { kind: 'refused', reason: describeError(error) };
           return;
         }
-        this.lost(attempt.signal.aborted ? 'no data for 4 s' : describeError(error));
+        const reason = attempt.signal.aborted ? 'no data for 4 s' : describeError(error);
+        this.lost(reason);
       } finally {
         attempt.abort();
         signal.removeEventListener('abort', stop);
       }
-      await sleep(this.backoff.nextMs(), signal);
+      if (this.joinsAnew()) this.link = { kind: 'connecting' };
+      else await sleep(this.backoff.nextMs(), signal);
     }
+  }
+
+  /** True once after a new name: nothing was lost. */
+  private joinsAnew(): boolean {
+    const { renamed } = this;
+    this.renamed = false;
+    return renamed;
   }
 
   private lost(reason: string): void {
@@ -110,9 +140,9 @@ export class Session {
 
   private async runOnce(attempt: AbortController): Promise<void> {
     const { signal } = attempt;
-    const { role, name, view } = this.options;
+    const { role, view } = this.options;
     const joined = await this.clients.session.join(
-      { displayName: name, role: pbRoles[role] },
+      { displayName: this.name, role: pbRoles[role] },
       { signal, timeoutMs: 5000 },
     );
     this.begin(joined, signal);

@@ -7,6 +7,8 @@ import type { Feature, Target } from '../session/types';
 /** Where a click would land, as far as this page can tell before the server decides. */
 export interface Landing {
   readonly target: Target;
+  /** The same where the server no longer keeps the frame that `target` names. */
+  readonly later?: Target | undefined;
   readonly pointInWorld: Vec3;
   readonly sigmaM: number | undefined; // undefined: nothing known about the depth
   readonly depthM: number;
@@ -44,16 +46,21 @@ export function landingInMap(
   features: Iterable<Feature>,
 ): Landing | undefined {
   const seen = seenFrom(view, pixel, features);
-  const direction = rayOf(view, pixel);
+  const ray = rayThrough(view, pixel);
   const guess = guessAt(view, pixel, seen);
   const nearest = seen[0];
-  if (!guess || !direction || !nearest) return undefined; // nothing mapped there
+  if (!guess || !ray || !nearest) return undefined; // nothing mapped there
   if (nearest.away <= SNAP_PX) {
     const { id, pointInWorld } = nearest.feature;
     return { ...guess, pointInWorld, target: { kind: 'feature', featureId: id } };
   }
-  const originInWorld = eyeOf(view);
-  return { ...guess, target: { kind: 'ray', originInWorld, directionInWorld: direction } };
+  return { ...guess, target: ray };
+}
+
+/** The ray of a pixel into the scene; undefined outside the lens. */
+export function rayThrough(view: View, pixel: Pixel): Target | undefined {
+  const directionInWorld = rayOf(view, pixel);
+  return directionInWorld && { kind: 'ray', originInWorld: eyeOf(view), directionInWorld };
 }
 
 /** Features in front of the eye, nearest to the click first. */

@@ -1,7 +1,15 @@
 import type { Shape } from '../session/types';
 
 export type ToolName = 'select' | 'cube' | 'note' | 'arrow';
-export type CommandName = 'undo' | 'redo' | 'delete' | 'swap' | 'follow' | 'frame' | 'reset';
+export type CommandName =
+  | 'undo'
+  | 'redo'
+  | 'delete'
+  | 'freeze'
+  | 'swap'
+  | 'follow'
+  | 'frame'
+  | 'reset';
 
 export interface Control<Name extends string> {
   readonly name: Name;
@@ -29,6 +37,13 @@ export const COMMANDS: readonly Control<CommandName>[] = [
     key: 'delete',
     shown: 'Del',
     hint: 'delete the selected mark',
+  },
+  {
+    name: 'freeze',
+    label: 'Freeze',
+    key: 'p',
+    shown: 'P',
+    hint: 'hold the picture and click in it; again: go on',
   },
   { name: 'swap', label: 'Swap', key: 's', shown: 'S', hint: 'swap the map and the video' },
   { name: 'follow', label: 'Follow', key: 'f', shown: 'F', hint: 'keep the wearer in view' },

@@ -1,3 +1,4 @@
+import { colourOf } from '../scene/strokes';
 import type { Annotation } from '../session/types';
 import type { Session } from '../session/session';
 import type { AppState } from './app_state';
@@ -77,6 +78,7 @@ export class AnnotationsPanel {
       row.element.scrollIntoView({ block: 'nearest' });
     }
     setClass(row.element, 'selected', selected);
+    row.element.style.setProperty('--mark', colourOf(annotation));
     row.button.setAttribute('aria-pressed', String(selected));
     this.updateEditor(row, annotation);
   }

@@ -25,7 +25,7 @@ export class App {
   private readonly meter = new LatencyMeter();
   private readonly screen = new RateMeter();
   private readonly help = new Help();
-  private readonly header = new Header(this.help.button);
+  private readonly header = new Header(this.help.button, (name) => this.session.rename(name));
   private readonly strip = new Strip();
   private readonly map: MapPane;
   private readonly video: VideoPane;
@@ -93,7 +93,10 @@ export class App {
     this.element.dataset['link'] = session.link.kind;
     this.header.update(session, player, this.meter);
     this.strip.update(session, this.meter, this.screen.rate(nowMs));
-    this.tools.update(state, this.map.map?.following ?? false);
+    this.tools.update(state, {
+      follow: this.map.map?.following ?? false,
+      freeze: this.video.frozen,
+    });
     this.annotations.update();
   }
 

@@ -2,8 +2,8 @@ import type { Pixel } from '../geometry/vec3';
 import type { View } from '../geometry/view';
 import { EditError, type Edits } from '../session/edits';
 import type { Session } from '../session/session';
-import { type Annotation, isPlaced } from '../session/types';
-import { type Landing, landingInMap, landingInVideo } from '../tools/landing';
+import { type Annotation, type FrameFacts, isPlaced } from '../session/types';
+import { type Landing, landingInMap, landingInVideo, rayThrough } from '../tools/landing';
 import { pickNearest } from '../tools/pick';
 import { type CommandName, shapeOf, type ToolName } from '../tools/tools';
 import type { AnnotationActions } from './annotations_panel';
@@ -47,6 +47,11 @@ export class Controller implements ToolActions, AnnotationActions {
         if (state.selectedId) this.remove(state.selectedId);
         else state.refuse('delete', 'Select a mark first.');
         break;
+      case 'freeze':
+        if (this.video.frozen) this.video.thaw();
+        else if (!this.video.freeze()) state.refuse('freeze', 'There is no picture yet.');
+        state.hover = undefined;
+        break;
       case 'swap':
         state.main = state.main === 'map' ? 'video' : 'map';
         break;
@@ -74,6 +79,7 @@ export class Controller implements ToolActions, AnnotationActions {
     const { state } = this;
     if (state.confirmingReset) state.confirmingReset = false;
     else if (state.tool !== 'select') this.choose('select');
+    else if (this.video.frozen) this.video.thaw();
     else state.selectedId = undefined;
     state.changed();
   }
@@ -185,7 +191,15 @@ export class Controller implements ToolActions, AnnotationActions {
       return view && landingInMap(view, pixel, features);
     }
     const current = this.video.current();
-    return current?.view && landingInVideo(current.view, current.facts.frameId, pixel, features);
+    if (!current?.view) return undefined;
+    const landing = landingInVideo(current.view, current.facts.frameId, pixel, features);
+    if (!landing || !this.video.frozen || !this.sameMap(current.facts)) return landing;
+    return { ...landing, later: rayThrough(current.view, pixel) };
+  }
+
+  /** False if the map has jumped since that frame: its pose says nothing about today's map. */
+  private sameMap({ pose }: FrameFacts): boolean {
+    return pose?.mapRevision === this.session.pose?.mapRevision;
   }
 
   private pick(view: View, pixel: Pixel, radius: number): Annotation | undefined {
@@ -207,6 +221,7 @@ export class Controller implements ToolActions, AnnotationActions {
         shape,
         text: '',
         target: landing.target,
+        later: landing.later,
         guessInWorld: landing.pointInWorld,
       });
       state.selectedId = placed.id;
@@ -216,7 +231,8 @@ export class Controller implements ToolActions, AnnotationActions {
   }
 
   private whyNoLanding(pane: PaneName): string {
-    if (!isPlaced(this.session.pose)) {
+    const pose = pane === 'video' ? this.video.current()?.facts.pose : this.session.pose;
+    if (!isPlaced(pose)) {
       return 'Not placed: where the camera is is not known now.';
     }
     return pane === 'map'

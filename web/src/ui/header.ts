@@ -1,5 +1,6 @@
 import { pageNowMs } from '../session/clock';
 import type { LatencyMeter } from '../session/latency';
+import { cleanName, keepName, recallName } from '../session/name';
 import type { Session } from '../session/session';
 import { h, setClass, setText } from './dom';
 import type { Player } from './player';
@@ -26,7 +27,7 @@ export class Header {
   });
   private readonly presence = h('span', { class: 'presence' });
 
-  constructor(helpButton: HTMLElement) {
+  constructor(helpButton: HTMLElement, rename: (name: string) => void) {
     this.element = h(
       'header',
       {},
@@ -37,6 +38,7 @@ export class Header {
       this.rate,
       this.latency,
       this.presence,
+      nameField(rename),
       helpButton,
     );
   }
@@ -59,4 +61,30 @@ export class Header {
     setText(this.latency, live && total !== undefined ? `${total.toFixed(0)} ms` : '– ms');
     setText(this.presence, session.live ? presenceWords(participants) : '');
   }
+}
+
+/** Who I am, as the others see it. */
+function nameField(rename: (name: string) => void): HTMLElement {
+  const input = h('input', {
+    class: 'name',
+    type: 'text',
+    maxlength: '60',
+    autocomplete: 'nickname',
+    'aria-label': 'Your name',
+    title:
+      'Your name, as the others see it. A new one begins a new session: what you did before it can no longer be undone.',
+  });
+  let name = recallName(location.search, localStorage);
+  input.value = name;
+  input.addEventListener('change', () => {
+    name = cleanName(input.value) || name;
+    input.value = name;
+    keepName(name, localStorage);
+    rename(name);
+  });
+  input.addEventListener('keydown', ({ key }) => {
+    if (key === 'Escape') input.value = name;
+    if (key === 'Enter' || key === 'Escape') input.blur();
+  });
+  return input;
 }

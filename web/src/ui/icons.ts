@@ -9,6 +9,7 @@ export const ICONS: Record<ToolName | CommandName | 'help', string> = {
   undo: 'M8 4L4 8l4 4M4 8h7.5a4.5 4.5 0 010 9H8',
   redo: 'M12 4l4 4-4 4M16 8H8.5a4.5 4.5 0 000 9H12',
   delete: 'M4 5.5h12M8 5.5V3.5h4v2M5.5 5.5l.8 11h7.400l.8-11M8.5 8.5v5M11.5 8.5v5',
+  freeze: 'M7 4v12M13 4v12',
   swap: 'M4 7h11M12 4l3 3-3 3M16 13H5M8 10l-3 3 3 3',
   follow: 'M10 6.5a3.5 3.5 0 100 7 3.5 3.5 0 000-7zM10 2v3M10 15v3M2 10h3M15 10h3',
   frame: 'M3 7V3h4M13 3h4v4M17 13v4h-4M7 17H3v-4M8 8h4v4H8z',

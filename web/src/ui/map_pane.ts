@@ -1,39 +1,25 @@
 import type { Pixel } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
 import type { MapView } from '../scene/map_view';
-import { axisStrokes, strokesOf } from '../scene/strokes';
 import type { Session } from '../session/session';
 import { isPlaced } from '../session/types';
-import { landingWords, ringRadius } from '../tools/landing';
 import type { AppState } from './app_state';
-import { h, setText } from './dom';
-import { allMarks } from './marks';
-import { Painter } from './painter';
+import { h } from './dom';
+import { Pane } from './pane';
 import type { Player } from './player';
 
 /** The 3D map: three.js below, the same marks as on the video above it. */
-export class MapPane {
-  readonly element: HTMLElement;
+export class MapPane extends Pane {
   map: MapView | undefined; // arrives after the video: three.js is the larger part of the page
-  private readonly canvas = h('canvas', { class: 'map' });
-  private readonly painter = new Painter();
-  private readonly note = h('p', { class: 'pane-note', role: 'status' });
+  private readonly canvas: HTMLCanvasElement;
   private drawnState = -1;
   private drawnAnnotations = -1;
 
-  constructor(
-    private readonly session: Session,
-    private readonly player: Player,
-    private readonly state: AppState,
-  ) {
-    this.element = h(
-      'section',
-      { class: 'pane map3d', 'aria-label': '3D map', tabindex: '0' },
-      this.canvas,
-      this.painter.canvas,
-      h('h2', { class: 'pane-title' }, 'Map'),
-      this.note,
-    );
+  constructor(session: Session, player: Player, state: AppState) {
+    const canvas = h('canvas', { class: 'map' });
+    const words = { className: 'map3d', label: '3D map', title: 'Map' };
+    super('map', words, [canvas], session, player, state);
+    this.canvas = canvas;
   }
 
   async load(): Promise<void> {
@@ -86,22 +72,13 @@ export class MapPane {
       return;
     this.drawnAnnotations = version;
     this.drawnState = this.state.version;
-    this.drawMarks(map.view(), width, height);
+    this.drawOver(map.view(), width, height);
   }
 
-  private drawMarks(view: View, width: number, height: number): void {
+  private drawOver(view: View, width: number, height: number): void {
     this.painter.begin({ width, height }, { left: 0, top: 0, scale: 1 });
-    this.painter.axes(axisStrokes(view));
-    const { selectedId, pointedId } = this.state;
-    this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), [
-      selectedId,
-      pointedId,
-    ]);
-    const { hover } = this.state;
-    if (hover?.pane === 'map' && hover.landing) {
-      const at = projectPoint(view, hover.landing.pointInWorld);
-      if (at) this.painter.ring(at, ringRadius(view, hover.landing), landingWords(hover.landing));
-    }
+    this.drawMarks(view);
+    this.drawLanding(view, ({ landing }) => landing && projectPoint(view, landing.pointInWorld));
     const { translation: t, rotation: q } = view.worldFromCamera;
     this.canvas.dataset['eye'] = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].join(' ');
     this.canvas.dataset['focalPx'] = String(view.camera.intrinsics.fx);
@@ -115,6 +92,6 @@ export class MapPane {
     else if (!this.map) text = 'loading the map';
     else if (map.features.size === 0) text = 'nothing mapped yet';
     else if (pose && !pose.metric) text = 'scale unknown: no target was seen, sizes are relative';
-    setText(this.note, text);
+    this.setNote(text);
   }
 }

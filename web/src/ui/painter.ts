@@ -1,5 +1,6 @@
 import type { Pixel } from '../geometry/vec3';
 import { FEATURE_CSS } from '../scene/feature_css';
+import type { EdgeArrow } from '../scene/edge_arrows';
 import type { AxisStroke, Marks } from '../scene/strokes';
 import type { FeatureState } from '../session/types';
 
@@ -118,13 +119,36 @@ export class Painter {
     context.fillText(text, x + 6 * ratio, y + height / 2 + ratio / 2);
   }
 
+  /** Towards marks outside the picture: filled, or an outline where not to be trusted. */
+  edgeArrows(arrows: readonly EdgeArrow[], accented: readonly (string | undefined)[]): void {
+    const size = this.ratio * this.thinning;
+    for (const { tip, direction, hollow, annotationId, colour } of arrows) {
+      const [x, y] = [this.x(tip), this.y(tip)];
+      const [du, dv] = [direction.u * size, direction.v * size];
+      this.context.beginPath();
+      this.context.moveTo(x, y);
+      this.context.lineTo(x - 18 * du - 10 * dv, y - 18 * dv + 10 * du);
+      this.context.lineTo(x - 18 * du + 10 * dv, y - 18 * dv - 10 * du);
+      this.context.closePath();
+      this.stroke(HALO, 6);
+      const chosen = annotationId !== '' && accented.includes(annotationId);
+      this.context.fillStyle = chosen ? ACCENT : colour;
+      if (!hollow) this.context.fill();
+      this.stroke(chosen ? ACCENT : colour, 2);
+    }
+  }
+
+  /** Signs are smaller on a small picture, where they lie closer together. */
+  private get thinning(): number {
+    return Math.min(Math.max(this.scale / this.ratio, 0.6), 1.1);
+  }
+
   /** Colour and shape by state: disc measured, cross failed, ring not attempted. */
   feature(at: Pixel, state: FeatureState): void {
     const { context, ratio } = this;
     const x = this.x(at);
     const y = this.y(at);
-    // Smaller on a small picture, where they lie closer together.
-    const r = 3.5 * ratio * Math.min(Math.max(this.scale / ratio, 0.6), 1.1);
+    const r = 3.5 * ratio * this.thinning;
     context.beginPath();
     if (state === 'failed') {
       context.moveTo(x - r, y - r);

@@ -64,17 +64,19 @@ export class ToolsColumn {
     );
   }
 
-  update(state: AppState, following: boolean): void {
+  /** `on`: which of the commands that stay on are. */
+  update(state: AppState, on: Partial<Record<CommandName, boolean>>): void {
     for (const { name } of TOOLS) {
       const button = this.buttons.get(name);
       if (!button) continue;
       setClass(button, 'current', state.tool === name);
       button.setAttribute('aria-pressed', String(state.tool === name));
     }
-    const follow = this.buttons.get('follow');
-    if (follow) {
-      setClass(follow, 'on', following);
-      follow.setAttribute('aria-pressed', String(following));
+    for (const [name, isOn] of Object.entries(on)) {
+      const button = this.buttons.get(name);
+      if (!button) continue;
+      setClass(button, 'on', isOn);
+      button.setAttribute('aria-pressed', String(isOn));
     }
     for (const [name, element] of this.reasons) setText(element, state.refusal(name) ?? '');
     const opening = state.confirmingReset && this.confirm.classList.contains('hidden');

@@ -1,42 +1,50 @@
 import type { Pixel } from '../geometry/vec3';
 import { makeView, projectPoint, type View } from '../geometry/view';
-import { axisStrokes, strokesOf } from '../scene/strokes';
+import { edgeArrowsOf } from '../scene/edge_arrows';
 import type { Session } from '../session/session';
 import { pageNowMs } from '../session/clock';
 import { type FrameFacts, isPlaced } from '../session/types';
-import { landingWords, ringRadius } from '../tools/landing';
 import type { AppState } from './app_state';
-import { h, setText } from './dom';
-import { allMarks } from './marks';
-import { Painter } from './painter';
+import { Pane } from './pane';
 import type { Player } from './player';
+import { Still } from './still';
 
 const STALE_MS = 1000;
 
-/** The live picture with the marks that belong to exactly that frame. */
-export class VideoPane {
-  readonly element: HTMLElement;
-  private readonly painter = new Painter();
-  private readonly note = h('p', { class: 'pane-note', role: 'status' });
+/** The live picture, or a frozen one, with the marks that belong to exactly that frame. */
+export class VideoPane extends Pane {
+  private still: Still | undefined;
 
-  constructor(
-    private readonly session: Session,
-    private readonly player: Player,
-    private readonly state: AppState,
-  ) {
-    this.element = h(
-      'section',
-      { class: 'pane video', 'aria-label': 'Live video', tabindex: '0' },
-      player.canvas,
-      this.painter.canvas,
-      h('h2', { class: 'pane-title' }, 'Video'),
-      this.note,
-    );
+  constructor(session: Session, player: Player, state: AppState) {
+    const words = { className: 'video', label: 'Live video', title: 'Video' };
+    super('video', words, [player.canvas], session, player, state);
+  }
+
+  get frozen(): boolean {
+    return this.still !== undefined;
+  }
+
+  /** Holds the frame on the screen; false if there is none yet. */
+  freeze(): boolean {
+    const { shown, canvas } = this.player;
+    if (!shown) return false;
+    this.thaw();
+    this.still = new Still(shown.facts, canvas, this.session);
+    canvas.after(this.still.canvas);
+    this.element.classList.add('frozen');
+    return true;
+  }
+
+  /** Shows the live picture again. */
+  thaw(): void {
+    this.still?.canvas.remove();
+    this.still = undefined;
+    this.element.classList.remove('frozen');
   }
 
   /** The frame on the screen and the view it was taken from; undefined before the first. */
   current(): { facts: FrameFacts; view: View | undefined } | undefined {
-    const facts = this.player.shown?.facts;
+    const facts = this.still?.facts ?? this.player.shown?.facts;
     if (!facts) return undefined;
     const { pose, camera } = facts;
     return { facts, view: isPlaced(pose) ? makeView(camera, pose.worldFromCamera) : undefined };
@@ -72,32 +80,26 @@ export class VideoPane {
   }
 
   draw(): void {
+    if (this.still && !this.still.valid) this.thaw();
     const layout = this.layout();
-    const { canvas } = this.player;
-    canvas.style.transform = `translate(${layout.left}px, ${layout.top}px) scale(${layout.scale})`;
+    const transform = `translate(${layout.left}px, ${layout.top}px) scale(${layout.scale})`;
+    this.player.canvas.style.transform = transform;
+    if (this.still) this.still.canvas.style.transform = transform;
     const { clientWidth, clientHeight } = this.element;
     this.painter.begin({ width: clientWidth, height: clientHeight }, layout);
     this.painter.clip(layout.width, layout.height);
     const current = this.current();
-    if (current) this.drawFrame(current.facts, current.view);
+    if (current?.view) this.drawFrame(current.facts, current.view);
     this.painter.end();
     this.painter.canvas.dataset['frameId'] = current ? String(current.facts.frameId) : '';
     this.updateNote();
   }
 
-  private drawFrame(facts: FrameFacts, view: View | undefined): void {
-    if (!view) return;
+  private drawFrame(facts: FrameFacts, view: View): void {
     this.drawFeatures(facts, view);
-    this.painter.axes(axisStrokes(view));
-    const { selectedId, pointedId } = this.state;
-    this.painter.marks(strokesOf(view, allMarks(this.session.annotations)), [
-      selectedId,
-      pointedId,
-    ]);
-    const { hover } = this.state;
-    if (hover?.pane !== 'video' || !hover.landing) return;
-    const { landing, pixel } = hover;
-    this.painter.ring(pixel, ringRadius(view, landing), landingWords(landing));
+    const marks = this.drawMarks(view);
+    this.painter.edgeArrows(edgeArrowsOf(view, marks), this.accented);
+    this.drawLanding(view, ({ pixel }) => pixel);
   }
 
   /**
@@ -107,24 +109,27 @@ export class VideoPane {
   private drawFeatures(facts: FrameFacts, view: View): void {
     const { map } = this.session;
     const exact = map.seenIn(facts.frameId);
-    for (const { id, state, pixel } of exact ?? map.seenUpTo(facts.frameId) ?? []) {
+    const seen = exact ?? this.still?.seen ?? map.seenUpTo(facts.frameId) ?? [];
+    for (const { id, state, pixel } of seen) {
       const feature = map.features.get(id);
-      const at = exact ? pixel : feature && projectPoint(view, feature.pointInWorld);
+      const at = exact || this.still ? pixel : feature && projectPoint(view, feature.pointInWorld);
       if (at && facts.camera.inImage(at)) this.painter.feature(at, state);
     }
   }
 
   private updateNote(): void {
-    const { player, state, session } = this;
+    const { player, state, session, still } = this;
     const refusal = state.refusal('video');
-    const age = player.shown ? pageNowMs() - player.shown.drawnMs : 0;
+    const nowMs = pageNowMs();
+    const age = player.shown ? nowMs - player.shown.drawnMs : 0;
+    const stale = age > STALE_MS && !session.sourceEnded;
     let text = '';
     if (player.unsupported) text = `No video. ${player.unsupported}`;
     else if (refusal) text = refusal;
-    else if (player.shown && age > STALE_MS && !session.sourceEnded) {
-      text = `picture is ${(age / 1000).toFixed(0)} s old`;
-    } else if (!player.shown && session.live) text = 'waiting for the first picture';
-    setText(this.note, text);
-    this.element.classList.toggle('stale', age > STALE_MS && !session.sourceEnded);
+    else if (still) text = `frozen, ${((nowMs - still.sinceMs) / 1000).toFixed(0)} s: P goes on`;
+    else if (player.shown && stale) text = `picture is ${(age / 1000).toFixed(0)} s old`;
+    else if (!player.shown && session.live) text = 'waiting for the first picture';
+    this.setNote(text);
+    this.element.classList.toggle('stale', stale && !still);
   }
 }

@@ -1,0 +1,61 @@
+import type { Pixel } from '../geometry/vec3';
+import type { View } from '../geometry/view';
+import { axisStrokes, type Mark, strokesOf } from '../scene/strokes';
+import type { Session } from '../session/session';
+import { landingWords, ringRadius } from '../tools/landing';
+import type { AppState, Hover, PaneName } from './app_state';
+import { h, setText } from './dom';
+import { allMarks } from './marks';
+import { Painter } from './painter';
+import type { Player } from './player';
+
+/** What the map and the video share: a picture, the same marks above it, and a line of words. */
+export abstract class Pane {
+  readonly element: HTMLElement;
+  protected readonly painter = new Painter();
+  private readonly note = h('p', { class: 'pane-note', role: 'status' });
+
+  constructor(
+    private readonly name: PaneName,
+    words: { readonly className: string; readonly label: string; readonly title: string },
+    pictures: readonly HTMLElement[],
+    protected readonly session: Session,
+    protected readonly player: Player,
+    protected readonly state: AppState,
+  ) {
+    this.element = h(
+      'section',
+      { class: `pane ${words.className}`, 'aria-label': words.label, tabindex: '0' },
+      ...pictures,
+      this.painter.canvas,
+      h('h2', { class: 'pane-title' }, words.title),
+      this.note,
+    );
+  }
+
+  protected setNote(text: string): void {
+    setText(this.note, text);
+  }
+
+  /** Those whose row is selected or pointed at. */
+  protected get accented(): readonly (string | undefined)[] {
+    return [this.state.selectedId, this.state.pointedId];
+  }
+
+  /** Axes and every mark in `view`; returns the marks. */
+  protected drawMarks(view: View): readonly Mark[] {
+    const marks = allMarks(this.session.annotations);
+    this.painter.axes(axisStrokes(view));
+    this.painter.marks(strokesOf(view, marks), this.accented);
+    return marks;
+  }
+
+  /** Where a click would land, if the pointer is over this pane: `at` says where to draw that. */
+  protected drawLanding(view: View, at: (hover: Hover, view: View) => Pixel | undefined): void {
+    const { hover } = this.state;
+    if (hover?.pane !== this.name || !hover.landing) return;
+    const pixel = at(hover, view);
+    if (!pixel) return;
+    this.painter.ring(pixel, ringRadius(view, hover.landing), landingWords(hover.landing));
+  }
+}

@@ -1,0 +1,50 @@
+import { pageNowMs } from '../session/clock';
+import type { SeenFeature } from '../session/map_state';
+import type { Session } from '../session/session';
+import type { FrameFacts } from '../session/types';
+
+/**
+ * A frame held on the screen, to be looked at and clicked while the live picture goes on. At once as
+ * it was decoded, and without loss as soon as the server has sent it.
+ */
+export class Still {
+  readonly canvas = document.createElement('canvas');
+  readonly sinceMs = pageNowMs();
+  /** What that frame saw, for as long as it is held. */
+  readonly seen: readonly SeenFeature[] | undefined;
+  private readonly sessionId: string;
+
+  constructor(
+    readonly facts: FrameFacts,
+    live: HTMLCanvasElement,
+    private readonly session: Session,
+  ) {
+    this.seen = session.map.seenIn(facts.frameId) ?? session.map.seenUpTo(facts.frameId);
+    this.sessionId = session.sessionId;
+    this.canvas.className = 'still';
+    this.canvas.width = live.width;
+    this.canvas.height = live.height;
+    this.canvas.dataset['frameId'] = String(facts.frameId);
+    this.paint(live);
+    void this.sharpen();
+  }
+
+  /** False once its session is over: frame ids begin anew with a server, so it names nothing now. */
+  get valid(): boolean {
+    return this.session.sessionId === this.sessionId;
+  }
+
+  private paint(picture: CanvasImageSource): void {
+    const { width, height } = this.canvas;
+    this.canvas.getContext('2d', { alpha: false })?.drawImage(picture, 0, 0, width, height);
+  }
+
+  private async sharpen(): Promise<void> {
+    const png = await this.session.fetchPng(this.facts.frameId).catch(() => undefined);
+    if (!png || !this.valid) return; // what was decoded has to do
+    const bitmap = await createImageBitmap(new Blob([png], { type: 'image/png' }));
+    this.paint(bitmap);
+    bitmap.close();
+    this.canvas.dataset['lossless'] = 'true';
+  }
+}
