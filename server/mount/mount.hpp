@@ -16,6 +16,8 @@ namespace saccade {
 struct MountDemand {
   Eigen::Vector3d angles_rad = Eigen::Vector3d::Zero();
   Eigen::Vector3d rates_rad_s = Eigen::Vector3d::Zero();
+  /// The motors stay below these whatever they have to catch up with (a servo's profile velocity).
+  Eigen::Vector3d rate_limits_rad_s = Eigen::Vector3d::Constant(1e3);
 };
 
 /// One reading of the encoders.

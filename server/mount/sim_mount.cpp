@@ -79,8 +79,9 @@ void SimMount::StepJoint(int index, double reference, double rate) {
       std::abs(error) > kNotFollowing_rad && std::abs(joint.rate) < 1e-3 ? joint.behind_ms + 1 : 0;
   if (joint.stuck) return;
   const double a = limits.max_acceleration_rad_s2;
-  const double wanted = std::clamp(rate + ApproachRate(error, a, options_.servo_gain_per_s),
-                                   -limits.max_rate_rad_s, limits.max_rate_rad_s);
+  const double most = std::min(limits.max_rate_rad_s, active_.demand.rate_limits_rad_s(index));
+  const double wanted =
+      std::clamp(rate + ApproachRate(error, a, options_.servo_gain_per_s), -most, most);
   joint.rate += std::clamp(wanted - joint.rate, -a * kStep_s, a * kStep_s);
   joint.angle += joint.rate * kStep_s;
   if (joint.angle < limits.min_rad || joint.angle > limits.max_rad) {
@@ -99,7 +100,8 @@ void SimMount::ReadEncoders() {
 }
 
 absl::Status SimMount::Send(const MountDemand& demand) {
-  if (!demand.angles_rad.allFinite() || !demand.rates_rad_s.allFinite()) {
+  if (!demand.angles_rad.allFinite() || !demand.rates_rad_s.allFinite() ||
+      !(demand.rate_limits_rad_s.minCoeff() >= 0)) {
     return absl::InvalidArgumentError("mount: the demanded angles or rates are not finite");
   }
   const std::lock_guard lock(mutex_);
