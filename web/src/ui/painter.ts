@@ -79,14 +79,16 @@ export class Painter {
     this.context.stroke();
   }
 
-  /** Light lines with a dark halo; accented ones in that colour, a hollow one dashed. */
+  /** Lines with a dark halo, a hollow one dashed; accented ones in that colour and above the rest. */
   marks({ strokes, labels }: Marks, accented: readonly (string | undefined)[]): void {
     const chosen = (id: string): boolean => id !== '' && accented.includes(id);
     for (const { points } of strokes) {
       this.trace(points);
       this.stroke(HALO, 5);
     }
-    for (const { points, hollow, annotationId, colour } of strokes) {
+    const below = strokes.filter(({ annotationId }) => !chosen(annotationId));
+    const above = strokes.filter(({ annotationId }) => chosen(annotationId));
+    for (const { points, hollow, annotationId, colour } of [...below, ...above]) {
       if (hollow) this.context.setLineDash([5 * this.ratio, 5 * this.ratio]);
       this.trace(points);
       this.stroke(chosen(annotationId) ? ACCENT : colour, 2);

@@ -2,9 +2,11 @@ import { join } from 'node:path';
 import { createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { AnnotationService } from '../../src/gen/saccade/v1/annotation_pb.js';
+import { MapService } from '../../src/gen/saccade/v1/map_pb.js';
 import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { Expert } from './expert.mjs';
+import { frozenPicture } from './freeze.mjs';
 import { cubePixels, inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
 import { decodePng, mean, median, pixelsOf, psnr } from './pictures.mjs';
 import { renderTruth, startServer, Truth } from './server.mjs';
@@ -13,6 +15,7 @@ const ACCENT = [0xc4, 0xb0, 0xff]; // the selected mark
 const CUBE_M = 0.05;
 const PICTURES = 10;
 const PER_PANE = 10;
+const MAPPED_M = 0.05; // in the map one can only click what it shows: a feature this near to the object
 const AIM_PX = 15; // a click farther than this from its object missed it: not counted, tried again
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -51,6 +54,7 @@ export async function runChecks({
     const transport = createGrpcWebTransport({ baseUrl: context.server.http });
     context.session = createClient(SessionService, transport);
     context.annotations = createClient(AnnotationService, transport);
+    context.map = createClient(MapService, transport);
     const joined = await context.session.join({ displayName: 'test' });
     context.camera = joined.intrinsics;
     context.truth = new Truth(truthFile);
@@ -61,6 +65,7 @@ export async function runChecks({
     await decodedPictures(context);
     await clicks(context);
     await drawnCubes(context);
+    await frozenPicture(context);
     if (!process.env['SACCADE_VERBOSE']) await restart(context, start);
     context.check(
       'page errors',
@@ -210,14 +215,26 @@ async function clickedPoint(expert, truth, camera, name) {
   return { point: inWorld(frame.world_from_camera, unproject(camera, pixel, depth)), depth };
 }
 
+/** Of these objects those that the map shows something of. */
+async function mappedOf({ map }, objects) {
+  const { map: now } = await map.get({});
+  const points = now.upserted
+    .filter(({ depthKnown }) => depthKnown)
+    .map(({ pointInWorldM: { x, y, z } }) => [x, y, z]);
+  return objects.filter(({ point_in_world_m: at }) =>
+    points.some((point) => length(minus(point, at)) < MAPPED_M),
+  );
+}
+
 /** As a person would: turn the wheel over the object until it is near, then click it. */
-async function aimInMap({ expert, truth }, used) {
+async function aimInMap(context, used) {
+  const { expert, truth } = context;
   const { id } = await expert.look();
   const frame = truth.frame(id);
   if (!frame) return undefined;
   await expert.press('h');
   await sleep(400);
-  const names = candidates(frame, used).map(({ name }) => name);
+  const names = (await mappedOf(context, candidates(frame, used))).map(({ name }) => name);
   const found = await findInMap(expert, frame, names);
   if (!found) return undefined;
   await expert.page.mouse.move(...found.at);
@@ -267,6 +284,9 @@ async function drawnCubes(context) {
       if ((await row.innerText()).includes('do not trust')) continue;
       const error = await cubeError(context, entry);
       if (error === undefined) continue;
+      if (process.env['SACCADE_VERBOSE']) {
+        console.log(`      ${entry.name} ${error.toFixed(2)} px: ${await row.innerText()}`);
+      }
       errors.push(error);
       ++seen;
     }

@@ -75,6 +75,16 @@ describe('rename', () => {
   });
 });
 
+describe('reset', () => {
+  it('says whose session asks', async () => {
+    const reset = vi.fn(() => Promise.resolve({}));
+    const session = new Session({ map: { reset } } as unknown as Clients, options, pictures);
+    session.joined = create(JoinResponseSchema, { sessionId: 's1' });
+    await new Edits(session).resetMap();
+    expect(reset).toHaveBeenCalledWith({ sessionId: 's1' }, expect.anything());
+  });
+});
+
 describe('placing in a frozen picture', () => {
   const ray = {
     kind: 'ray',

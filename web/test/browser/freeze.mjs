@@ -1,0 +1,76 @@
+// A frozen picture: is it that frame, to the bit, and do clicks in it land where that frame saw things,
+// also after the server no longer keeps it?
+import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
+import { inCamera, length, minus } from './optics.mjs';
+import { decodePng, median, psnr } from './pictures.mjs';
+
+const OBJECTS = 3; // clicked at once, and again when the frame is gone
+const RING_S = 10; // how long the server keeps a frame
+
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+export async function frozenPicture(context) {
+  const { expert, session, annotations, truth, check } = context;
+  await expert.enlarge('video');
+  await expert.press('v');
+  await expert.press('p');
+  const still = expert.page.locator('canvas.still[data-lossless]');
+  await still.waitFor({ timeout: 10_000 });
+  const id = Number(await still.getAttribute('data-frame-id'));
+  const url = await still.evaluate((canvas) => canvas.toDataURL('image/png'));
+  const kept = await session.getFrame({ frameId: BigInt(id), view: VideoView.RAW });
+  const ratio = psnr(decodePng(Buffer.from(url.split(',')[1], 'base64')), decodePng(kept.png));
+  const frame = truth.frame(id);
+  await sleep(1000);
+  const [live, marks] = [(await expert.look()).id, (await expert.marks()).id];
+  check(
+    'frozen: the very frame without loss, its marks, and the live picture goes on',
+    Number(kept.frameId) === id && ratio === Infinity && marks === id && live > id,
+    `frame ${id}, PSNR ${ratio}; marks of ${marks}, live at ${live}`,
+  );
+
+  for (const gone of [false, true]) {
+    if (gone) await sleep(1000 * (RING_S + 1));
+    await expert.press('c');
+    const ids = await placeOn(expert, frame);
+    await expert.press('v');
+    await sleep(1000);
+    const known = new Map(
+      (await annotations.list({})).annotations.map(({ id: key, anchor }) => [key, anchor]),
+    );
+    const errors = ids.map(({ key, object }) => {
+      const at = known.get(key)?.pointInWorldM;
+      const depth = inCamera(frame.world_from_camera, object.point_in_world_m)[2];
+      return at ? length(minus([at.x, at.y, at.z], object.point_in_world_m)) / depth : Infinity;
+    });
+    const refused = ids.find((entry) => entry.refused)?.refused;
+    check(
+      `clicks in the frozen picture${gone ? ` after ${RING_S} s` : ''}, median error below 2 % of depth`,
+      errors.length > 0 && median(errors) < 0.02,
+      refused ??
+        `${errors.length} cubes: ${errors.map((e) => `${(100 * e).toFixed(2)} %`).join(', ')}`,
+    );
+    for (let i = 0; i < ids.length; ++i) await expert.press('Control+z'); // leaves the room as it was
+    await sleep(500);
+  }
+  await expert.press('p');
+}
+
+/** A cube on each of some objects that the frame shows. */
+async function placeOn(expert, frame) {
+  const { left, top, scale, width, height } = await expert.look();
+  const placed = [];
+  for (const object of frame.objects) {
+    if (placed.length === OBJECTS) break;
+    if (!object.visible || !object.pixel) continue;
+    const [u, v] = object.pixel;
+    if (u < 30 || v < 30 || u > width - 30 || v > height - 30) continue;
+    const at = [left + (u + 0.5) * scale, top + (v + 0.5) * scale];
+    if (!(await expert.isOver('.video', at))) continue;
+    const before = await expert.annotationIds();
+    await expert.click(at);
+    const { id: key, refused } = await expert.newAnnotation(before);
+    placed.push({ key, refused, object });
+  }
+  return placed;
+}
