@@ -105,6 +105,7 @@ export class Session {
     while (!signal.aborted) {
       const attempt = new AbortController();
       this.attempt = attempt;
+      this.renamed = false;
       const stop = (): void => attempt.abort();
       signal.addEventListener('abort', stop);
       try {

@@ -33,3 +33,12 @@ export function setText(element: HTMLElement, text: string): void {
 export function setClass(element: HTMLElement, name: string, on: boolean): void {
   if (element.classList.contains(name) !== on) element.classList.toggle(name, on);
 }
+
+/** What this browser keeps between visits; where a person forbids that, nothing. */
+export function storage(): Pick<Storage, 'getItem' | 'setItem'> {
+  try {
+    return window.localStorage;
+  } catch {
+    return { getItem: () => null, setItem: () => undefined };
+  }
+}

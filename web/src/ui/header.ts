@@ -2,7 +2,7 @@ import { pageNowMs } from '../session/clock';
 import type { LatencyMeter } from '../session/latency';
 import { cleanName, keepName, recallName } from '../session/name';
 import type { Session } from '../session/session';
-import { h, setClass, setText } from './dom';
+import { h, setClass, setText, storage } from './dom';
 import type { Player } from './player';
 import { presenceWords, statusWords } from './words';
 
@@ -74,12 +74,12 @@ function nameField(rename: (name: string) => void): HTMLElement {
     title:
       'Your name, as the others see it. A new one begins a new session: what you did before it can no longer be undone.',
   });
-  let name = recallName(location.search, localStorage);
+  let name = recallName(location.search, storage());
   input.value = name;
   input.addEventListener('change', () => {
     name = cleanName(input.value) || name;
     input.value = name;
-    keepName(name, localStorage);
+    keepName(name, storage());
     rename(name);
   });
   input.addEventListener('keydown', ({ key }) => {

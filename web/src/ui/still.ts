@@ -26,7 +26,7 @@ export class Still {
     this.canvas.height = live.height;
     this.canvas.dataset['frameId'] = String(facts.frameId);
     this.paint(live);
-    void this.sharpen();
+    this.sharpen().catch(() => undefined); // then what was decoded has to do
   }
 
   /** False once its session is over: frame ids begin anew with a server, so it names nothing now. */
@@ -40,8 +40,8 @@ export class Still {
   }
 
   private async sharpen(): Promise<void> {
-    const png = await this.session.fetchPng(this.facts.frameId).catch(() => undefined);
-    if (!png || !this.valid) return; // what was decoded has to do
+    const png = await this.session.fetchPng(this.facts.frameId);
+    if (!this.valid) return;
     const bitmap = await createImageBitmap(new Blob([png], { type: 'image/png' }));
     this.paint(bitmap);
     bitmap.close();
