@@ -47,8 +47,7 @@ export async function frozenPicture(context) {
     check(
       `clicks in the frozen picture${gone ? ` after ${RING_S} s` : ''}, median error below 2 % of depth`,
       errors.length > 0 && median(errors) < 0.02,
-      refused ??
-        `${errors.length} cubes: ${errors.map((e) => `${(100 * e).toFixed(2)} %`).join(', ')}`,
+      refused ?? errors.map((e, i) => `${ids[i].object.name} ${(100 * e).toFixed(2)} %`).join(', '),
     );
     for (let i = 0; i < ids.length; ++i) await expert.press('Control+z'); // leaves the room as it was
     await sleep(500);
