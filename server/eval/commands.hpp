@@ -30,7 +30,7 @@ struct SimArguments {
   int runs = 1;
   std::uint64_t seed = 1;
   std::filesystem::path out;
-  double duration_s = 60.0;
+  double duration_s = 0;  // 0: the scenario's own
   TrackerArguments tracker;
   bool json = false;
 };

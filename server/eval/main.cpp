@@ -54,9 +54,9 @@ void AddSim(CLI::App& app, SimArguments& arguments) {
       ->capture_default_str();
   sim->add_option("--out", arguments.out, "Folder for report.json and one folder for each run")
       ->required();
-  sim->add_option("--duration", arguments.duration_s, "Seconds of each run")
-      ->check(CLI::Range(1.0, 36000.0))
-      ->capture_default_str();
+  sim->add_option("--duration", arguments.duration_s,
+                  "Seconds of each run; by default 60, or what the closed-loop scenario asks for")
+      ->check(CLI::Range(1.0, 36000.0));
   sim->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
   sim->add_option("--set", arguments.tracker.set,
                   "One tracker option as key=value; may be repeated")

@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "server/eval/commands.hpp"
+#include "server/eval/gaze_scenario.hpp"
 #include "server/eval/pixel_run.hpp"
 #include "server/eval/points_scenario.hpp"
 
@@ -106,13 +107,17 @@ std::string Table(const Json& report) {
 std::string ScenarioNames() {
   std::string names = "points";
   for (const PixelScenario& each : kPixelScenarios) absl::StrAppend(&names, ", ", each.name);
+  absl::StrAppend(&names, ", ", GazeScenarioNames());
   return names;
 }
 
-absl::Status SimCommand(const SimArguments& arguments) {
+absl::Status SimCommand(const SimArguments& asked) {
+  SimArguments arguments = asked;
+  if (arguments.duration_s <= 0 && !IsGazeScenario(arguments.scenario)) arguments.duration_s = 60;
   absl::StatusOr<Json> report = absl::InvalidArgumentError(absl::StrCat(
       "--scenario '", arguments.scenario, "' is unknown; use one of ", ScenarioNames()));
   if (arguments.scenario == "points") report = RunPointsScenario(arguments);
+  if (IsGazeScenario(arguments.scenario)) report = RunGazeScenario(arguments);
   for (const PixelScenario& each : kPixelScenarios) {
     if (each.name == arguments.scenario) report = RunPixels(arguments, each.motion);
   }

@@ -3,6 +3,7 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <vector>
 
 #include "server/gl/gl_context.hpp"
 #include "server/sim/lens.hpp"
@@ -13,6 +14,14 @@
 
 namespace saccade {
 
+/// Where the camera is against the shoulder during one exposure: poses evenly spread from its begin
+/// to its end; empty: the shoulder's own.
+struct HeadPath {
+  std::vector<Rigid3> shoulder_from_camera;
+  /// `share` 0: the exposure's begin, 1: its end.
+  Rigid3 At(double share) const;
+};
+
 /// Takes pictures of the room: exposure, lens, sensor. Lives on the thread that created it.
 class SimCamera {
  public:
@@ -21,17 +30,17 @@ class SimCamera {
                                                            const SimOptions& options,
                                                            const Wearer& wearer, GlBackend backend);
 
-  /// Picture `frame`, exposed around frame / fps, CV_8UC3. Depends on the options and `frame`
-  /// alone.
-  absl::StatusOr<cv::Mat> Take(std::uint64_t frame, bool with_noise);
+  /// Picture `frame`, exposed around frame / fps, CV_8UC3. Depends on the options, `frame` and
+  /// `head` alone.
+  absl::StatusOr<cv::Mat> Take(std::uint64_t frame, const HeadPath& head, bool with_noise);
   /// Depth along the optic axis at camera pixels of the instant picture at `time_s` [m], CV_32FC1,
   /// nearest drawn sample. For tests.
-  absl::StatusOr<cv::Mat> Depth(double time_s);
+  absl::StatusOr<cv::Mat> Depth(double time_s, const HeadPath& head);
 
  private:
   SimCamera(const CameraModel& camera, const SimOptions& options, const Wearer& wearer);
   /// Moments to average, so that nothing moves much more than a pixel between two of them.
-  int SubExposures(double time_s) const;
+  int SubExposures(double time_s, const HeadPath& head) const;
 
   CameraModel camera_;
   SimOptions options_;

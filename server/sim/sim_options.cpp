@@ -46,8 +46,16 @@ absl::Status SetMotion(const std::string& value, SimMotion& out) {
     out = SimMotion::kTurn;
   } else if (value == "still") {
     out = SimMotion::kStill;
+  } else if (value == "stand") {
+    out = SimMotion::kStand;
+  } else if (value == "rock") {
+    out = SimMotion::kRock;
+  } else if (value == "roll") {
+    out = SimMotion::kRoll;
+  } else if (value == "stroll") {
+    out = SimMotion::kStroll;
   } else {
-    return Bad("motion", value, "desk, sway, walk, turn or still");
+    return Bad("motion", value, "desk, sway, walk, turn, still, stand, rock, roll or stroll");
   }
   return absl::OkStatus();
 }

@@ -11,12 +11,12 @@
 namespace saccade {
 
 /// What the simulated wearer does (README.md describes each).
-enum class SimMotion { kDesk, kSway, kWalk, kTurn, kStill };
+enum class SimMotion { kDesk, kSway, kWalk, kTurn, kStill, kStand, kRock, kRoll, kStroll };
 
 /// `sim:desk?key=value&...`. Every key is optional.
 struct SimOptions {
   std::uint64_t seed = 1;  // seed: textures, small differences of the room, motion, noise
-  SimMotion motion = SimMotion::kDesk;        // motion: desk sway walk turn still
+  SimMotion motion = SimMotion::kDesk;        // motion: desk sway walk ... (README.md)
   std::optional<double> duration_s;           // duration: frames end after it; absent: never
   double noise = 1.5;                         // noise: sigma at mid grey [grey levels]; 0: none
   bool blur = true;                           // blur: motion blur of the exposure, on or off

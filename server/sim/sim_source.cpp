@@ -12,6 +12,12 @@
 
 namespace saccade {
 
+namespace {
+
+constexpr int kHeadSamples = 9;  // of the head's motion in one exposure
+
+}  // namespace
+
 SimSource::SimSource(const SimOptions& options, const SourceOptions& source)
     : options_(options), source_(source), wearer_(options.motion, options.seed) {
   info_.uri = "sim:desk";
@@ -78,7 +84,36 @@ Timestamp SimSource::CaptureTime(FrameId frame) const {
 
 void SimSource::Request(FrameId frame) {
   requested_ = frame;
-  picture_ = thread_->Submit([this, frame] { return camera_->Take(frame, /*with_noise=*/true); });
+  picture_ = thread_->Submit([this, frame, path = PathOf(frame)] {
+    return camera_->Take(frame, path, /*with_noise=*/true);
+  });
+}
+
+void SimSource::DriveHead(std::shared_ptr<HeadMotion> head) {
+  head_ = std::move(head);
+  info_.mount = std::make_shared<const MountModel>(head_->model());
+}
+
+HeadPath SimSource::PathOf(FrameId frame) {
+  HeadPath path;
+  if (head_ == nullptr) return path;
+  const Timestamp middle = CaptureTime(frame);
+  const auto half = static_cast<Timestamp>(std::llround(0.5e9 * options_.exposure_s));
+  head_->AdvanceTo(middle + half);
+  for (int k = 0; k < kHeadSamples; ++k) {
+    const Timestamp at = middle - half + 2 * half * k / (kHeadSamples - 1);
+    path.shoulder_from_camera.push_back(head_->model().MountFromCamera(head_->TrueAngles(at)));
+  }
+  const std::lock_guard lock(heads_mutex_);
+  heads_[frame] = head_->TrueAngles(middle);
+  return path;
+}
+
+std::optional<MountAngles> SimSource::TrueHead(FrameId frame) const {
+  const std::lock_guard lock(heads_mutex_);
+  const auto drawn = heads_.find(frame);
+  if (drawn == heads_.end()) return std::nullopt;
+  return drawn->second;
 }
 
 FrameId SimSource::WaitForTurn() {
@@ -105,21 +140,21 @@ FrameId SimSource::WaitForTurn() {
 
 absl::StatusOr<std::optional<Frame>> SimSource::Next() {
   if (info_.frame_count && next_ >= *info_.frame_count) return std::nullopt;
-  if (!picture_.valid()) Request(next_);
+  if (!picture_.valid() && head_ == nullptr) Request(next_);
   const FrameId id = WaitForTurn();
   if (info_.frame_count && id >= *info_.frame_count) return std::nullopt;
-  if (requested_ != id) Request(id);
+  if (requested_ != id || !picture_.valid()) Request(id);
   absl::StatusOr<cv::Mat> picture = picture_.get();
   if (!picture.ok()) return picture.status();
   next_ = id + 1;
-  if (!info_.frame_count || next_ < *info_.frame_count) Request(next_);
+  if (head_ == nullptr && (!info_.frame_count || next_ < *info_.frame_count)) Request(next_);
   Frame frame;
   frame.id = id;
   frame.capture_time_ns = CaptureTime(id);
   frame.color = *std::move(picture);
   cv::cvtColor(frame.color, frame.grey, cv::COLOR_BGR2GRAY);
   frame.camera = info_.camera;
-  frame.mount = MountAngles{};
+  if (head_ != nullptr) frame.mount = head_->ReadAngles(frame.capture_time_ns);
   frame.received_time_ns = MonotonicNow();
   if (truth_writer_) {
     if (const absl::Status written = truth_writer_->Write(Truth(id)); !written.ok()) return written;
@@ -135,7 +170,24 @@ absl::Status SimSource::WriteTruthTo(const std::filesystem::path& file) {
 }
 
 Rigid3 SimSource::WorldFromCamera(FrameId frame) const {
-  return wearer_.WorldFromCamera(static_cast<double>(frame) / options_.fps, {});
+  const Rigid3 shoulder = wearer_.WorldFromShoulder(static_cast<double>(frame) / options_.fps);
+  if (head_ == nullptr) return shoulder;
+  return shoulder * head_->model().MountFromCamera(TrueHead(frame).value_or(MountAngles{}));
+}
+
+Rigid3 SimSource::WorldFromCameraAt(Timestamp time_ns) const {
+  const Rigid3 shoulder =
+      wearer_.WorldFromShoulder(std::max(0.0, Seconds(time_ns - clock_zero_ns_.value_or(0))));
+  if (head_ == nullptr) return shoulder;
+  return shoulder * head_->model().MountFromCamera(head_->TrueAngles(time_ns));
+}
+
+std::optional<double> SimSource::SurfaceAlong(const Eigen::Vector3d& origin_in_world,
+                                              const Eigen::Vector3d& direction_in_world) const {
+  const std::optional<RayHit> hit =
+      caster_->Closest(origin_in_world.cast<float>(), direction_in_world.cast<float>());
+  if (!hit) return std::nullopt;
+  return static_cast<double>(hit->distance);
 }
 
 SimTruth SimSource::Truth(FrameId frame) const {
@@ -143,6 +195,7 @@ SimTruth SimSource::Truth(FrameId frame) const {
   truth.frame = frame;
   truth.capture_time_ns = CaptureTime(frame);
   truth.world_from_camera = WorldFromCamera(frame);
+  truth.head = TrueHead(frame).value_or(MountAngles{});
   for (const NamedPoint& object : objects_) {
     truth.objects.push_back({object.name, object.point_in_world,
                              PixelOf(frame, object.point_in_world),
@@ -180,14 +233,24 @@ bool SimSource::Visible(FrameId frame, const Eigen::Vector3d& point_in_world,
   return !hit || static_cast<double>(hit->distance) > distance - tolerance_m;
 }
 
+HeadPath SimSource::StillHead(FrameId frame) const {
+  const std::optional<MountAngles> angles = TrueHead(frame);
+  if (head_ == nullptr || !angles) return {};
+  return {{head_->model().MountFromCamera(*angles)}};
+}
+
 absl::StatusOr<cv::Mat> SimSource::RenderClean(FrameId frame) {
-  return thread_->Submit([this, frame] { return camera_->Take(frame, /*with_noise=*/false); })
+  return thread_
+      ->Submit(
+          [this, frame] { return camera_->Take(frame, StillHead(frame), /*with_noise=*/false); })
       .get();
 }
 
 absl::StatusOr<cv::Mat> SimSource::RenderDepth(FrameId frame) {
   return thread_
-      ->Submit([this, frame] { return camera_->Depth(static_cast<double>(frame) / options_.fps); })
+      ->Submit([this, frame] {
+        return camera_->Depth(static_cast<double>(frame) / options_.fps, StillHead(frame));
+      })
       .get();
 }
 

@@ -149,6 +149,46 @@ Wearer::Stance Wearer::Turn(double time_s) const {
   return stance;
 }
 
+// What slam-spec's T25 asks of a wearer: 3 cm and 6 deg at 0.5 Hz.
+Wearer::Stance Wearer::Rock(double time_s) const {
+  Stance stance;
+  const double start = MinimumJerk((time_s - kRestS) / 1.5);
+  const double phase = kTwoPi * 0.5 * (time_s - kRestS);
+  const double own = std::numbers::pi * Random(60, 0);
+  stance.position += start * 0.03 *
+                     Eigen::Vector3d(std::sin(phase), 0.4 * std::sin(phase + own + 2.0),
+                                     0.7 * std::sin(phase + own + 4.0));
+  stance.yaw += start * 6.0 * kDegree * std::sin(phase + own);
+  stance.pitch += start * 3.0 * kDegree * std::sin(phase + 1.3);
+  stance.roll += start * 2.0 * kDegree * std::sin(phase + own + 2.6);
+  return stance;
+}
+
+// T27: the shoulder rolls by +-20 deg at 0.2 Hz.
+Wearer::Stance Wearer::Roll(double time_s) const {
+  Stance stance;
+  const double start = MinimumJerk((time_s - kRestS) / 2.0);
+  stance.roll += start * 20.0 * kDegree * std::sin(kTwoPi * 0.2 * (time_s - kRestS));
+  return stance;
+}
+
+// Walks to and fro in the middle of the room and looks about: at most 0.35 m/s and 16 deg/s, so
+// that a head of 30 deg/s can follow.
+Wearer::Stance Wearer::Stroll(double time_s) const {
+  Stance stance;
+  const double moving_s = std::max(0.0, time_s - kRestS);
+  const double start = MinimumJerk(moving_s / 3.0);
+  const double side = Random(70, 0) > 0 ? 1.0 : -1.0;
+  stance.position.x() += side * start * 0.65 * std::sin(kTwoPi * moving_s / 13.0);
+  stance.position.z() += start * 0.55 * (1 - std::cos(kTwoPi * moving_s / 17.0));
+  stance.yaw += side * start * 38.0 * kDegree * std::sin(kTwoPi * moving_s / 16.0);
+  const double step = kTwoPi * 1.4 * moving_s;
+  stance.position.y() += start * 0.012 * (1 - std::cos(step));
+  stance.roll += start * 0.8 * kDegree * std::sin(0.5 * step);
+  stance.pitch += start * (0.10 + 0.4 * kDegree * std::sin(step));
+  return stance;
+}
+
 Wearer::Stance Wearer::StanceAt(double time_s) const {
   Stance stance;
   double sway = 0.15 + 0.85 * MinimumJerk((time_s - kRestS) / 1.5);
@@ -164,6 +204,16 @@ Wearer::Stance Wearer::StanceAt(double time_s) const {
     case SimMotion::kWalk:
       stance = Walk(time_s);
       sway *= 0.4;
+      break;
+    case SimMotion::kRock:
+      return Rock(time_s);
+    case SimMotion::kRoll:
+      return Roll(time_s);
+    case SimMotion::kStroll:
+      stance = Stroll(time_s);
+      sway *= 0.4;
+      break;
+    case SimMotion::kStand:
       break;
     case SimMotion::kTurn:
       stance = Turn(time_s);

@@ -36,6 +36,9 @@ class Wearer {
   Stance Desk(double time_s, double reach) const;
   Stance Walk(double time_s) const;
   Stance Turn(double time_s) const;
+  Stance Rock(double time_s) const;
+  Stance Roll(double time_s) const;
+  Stance Stroll(double time_s) const;
   /// A smooth random signal, mostly within +-1, at rest for the first 1.2 seconds.
   double Signal(double time_s, double knot_s, std::uint64_t channel) const;
   double Random(std::uint64_t channel, std::uint64_t index) const;  // uniform in -1 .. 1
@@ -44,8 +47,8 @@ class Wearer {
   std::uint64_t seed_;
 };
 
-/// Rotation of the head: Ry(pan) Rx(elevation) Rz(cyclotorsion), slam-spec section 8. The axes meet
-/// in the optic centre.
+/// Rotation of a head whose axes meet in the optic centre: Ry(pan) Rx(elevation) Rz(cyclotorsion),
+/// slam-spec section 8.
 Rigid3 ShoulderFromCamera(const MountAngles& head);
 
 }  // namespace saccade

@@ -1,0 +1,210 @@
+#include "server/eval/gaze_run.hpp"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "server/eval/registration.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kFalseDepth = 0.3;  // relative
+
+Timestamp Ns(double seconds) { return static_cast<Timestamp>(std::llround(1e9 * seconds)); }
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<GazeRun>> GazeRun::Create(const GazeRunOptions& options) {
+  if (const absl::Status valid = options.mount.mount.Validate(); !valid.ok()) return valid;
+  if (const absl::Status valid = options.gaze.Validate(); !valid.ok()) return valid;
+  absl::StatusOr<std::unique_ptr<SimSource>> source = SimSource::Open(options.sim);
+  if (!source.ok()) return source.status();
+  auto mount = std::make_shared<SimMount>(options.mount);
+  (*source)->DriveHead(mount);
+  SourceInfo info = (*source)->info();
+  if (!options.encoders) info.mount = nullptr;
+  absl::StatusOr<TrackerSession> session = MakeTrackerSession(info, options.tracker);
+  if (!session.ok()) return session.status();
+  absl::StatusOr<RunRecorder> recorder = RunRecorder::Create(options.folder);
+  if (!recorder.ok()) return recorder.status();
+  absl::StatusOr<OutputFile> truth = OutputFile::Create(options.folder / "groundtruth.txt");
+  if (!truth.ok()) return truth.status();
+  absl::StatusOr<OutputFile> gaze = OutputFile::Create(options.folder / "gaze.csv");
+  if (!gaze.ok()) return gaze.status();
+  return std::unique_ptr<GazeRun>(new GazeRun(options, *std::move(source), std::move(mount),
+                                              *std::move(session), *std::move(recorder),
+                                              *std::move(truth), *std::move(gaze)));
+}
+
+GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> source,
+                 std::shared_ptr<SimMount> mount, TrackerSession session, RunRecorder recorder,
+                 OutputFile truth_file, OutputFile gaze_file)
+    : options_(options),
+      mount_(std::move(mount)),
+      source_(std::move(source)),
+      session_(std::move(session)),
+      recorder_(std::move(recorder)),
+      truth_file_(std::move(truth_file)),
+      gaze_file_(std::move(gaze_file)),
+      loop_(std::make_unique<GazeLoop>(*mount_, options.gaze, [] { return "evaluation"; })),
+      ring_(std::make_unique<FrameRing>()) {
+  AnchorOptions anchor_options;
+  if (source_->info().target) anchor_options.world_key = WorldKey(*source_->info().target);
+  anchors_ = std::make_unique<AnchorManager>(
+      anchor_options, [ring = ring_.get()](FrameId id) { return ring->Find(id); }, session_.seed);
+  mount_->AdvanceTo(0);
+  truth_file_.Write("# timestamp tx ty tz qx qy qz qw   (camera in world, metres)\n");
+  gaze_file_.Write(
+      "time_s,mode,pan_deg,elevation_deg,cyclotorsion_deg,believed_error_deg,true_roll_deg\n");
+}
+
+absl::Status GazeRun::RunUntil(double time_s, const std::function<void()>& tick) {
+  const Timestamp step = Ns(1.0 / options_.control_hz);
+  while (now_ns_ < Ns(time_s)) {
+    now_ns_ += step;
+    mount_->AdvanceTo(now_ns_);
+    // A picture can be taken once the head has moved, and its encoders have spoken, past it.
+    while (!ended_ &&
+           Seconds(now_ns_) > static_cast<double>(next_frame_) / options_.sim.fps + 0.02) {
+      if (const absl::Status taken = TakeFrame(); !taken.ok()) return taken;
+    }
+    Control();
+    tick();
+  }
+  return gaze_file_.status();
+}
+
+void GazeRun::Control() {
+  while (!due_.empty() && due_.front().publish_ns <= now_ns_) {
+    loop_->OnView(due_.front().view);
+    due_.pop_front();
+  }
+  loop_->Step(now_ns_);
+  const Eigen::Vector3d joints = ToVector(mount_->TrueAngles(now_ns_));
+  if (last_joints_) {
+    const double rate = (joints - *last_joints_).cwiseAbs().maxCoeff() * options_.control_hz;
+    peak_rate_deg_s_ = std::max(peak_rate_deg_s_, rate / kDegree);
+  }
+  last_joints_ = joints;
+  const GazeSnapshot& state = *loop_->snapshot();
+  gaze_file_.Write(absl::StrFormat(
+      "%.3f,%s,%.3f,%.3f,%.3f,%s,%.3f\n", time_s(), ToString(state.mode), joints.x() / kDegree,
+      joints.y() / kDegree, joints.z() / kDegree,
+      state.error_rad ? absl::StrFormat("%.3f", *state.error_rad / kDegree) : "", TrueRoll_deg()));
+}
+
+absl::Status GazeRun::TakeFrame() {
+  absl::StatusOr<std::optional<Frame>> taken = source_->Next();
+  if (!taken.ok()) return taken.status();
+  if (!*taken) {
+    ended_ = true;
+    return absl::OkStatus();
+  }
+  Frame frame = **std::move(taken);
+  next_frame_ = frame.id + 1;
+  const std::optional<MountAngles> read = frame.mount;
+  if (!options_.encoders) frame.mount.reset();
+  const Timestamp begin = MonotonicNow();
+  const double cpu_begin_ms = ThreadCpuMs();
+  newest_ = session_.track(frame);
+  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin), ThreadCpuMs() - cpu_begin_ms};
+  ring_->Push({std::make_shared<const Frame>(frame), newest_});
+  anchors_->Resolve(newest_, *frame.camera);
+  Due due{.publish_ns = frame.capture_time_ns + Ns(options_.delay_s), .view = {}};
+  due.view.map = newest_;
+  due.view.annotations = anchors_->Latest();
+  due.view.angles = read;
+  // The chessboard hangs upright on the wall: its frame knows where down is.
+  if (newest_->metric) due.view.down_in_world = Eigen::Vector3d::UnitY();
+  due_.push_back(std::move(due));
+  return Record(frame, cost);
+}
+
+absl::Status GazeRun::Record(const Frame& frame, const FrameCost& cost) {
+  const Rigid3 truth = source_->WorldFromCamera(frame.id);
+  truth_.push_back({frame.capture_time_ns, truth});
+  truth_file_.Write(TumLine(absl::StrFormat("%.9f", Seconds(frame.capture_time_ns)), truth));
+  FrameVerdict verdict = VerdictOf(*newest_);
+  const bool posed = verdict == FrameVerdict::kTracked || verdict == FrameVerdict::kCoasting;
+  if (posed && IsLost(newest_->world_from_camera, truth)) verdict = FrameVerdict::kLost;
+  if (verdict != FrameVerdict::kInitialising) {
+    measured_.Add(newest_->matched);
+    if (newest_->searched_px2 > 0 && newest_->attempted > 0) {
+      searched_px2_.Add(newest_->searched_px2 / newest_->attempted);
+    }
+  }
+  if (const absl::Status added = recorder_.Add(frame, *newest_, cost, verdict); !added.ok()) {
+    return added;
+  }
+  return truth_file_.status();
+}
+
+absl::StatusOr<GazeRun::Clicked> GazeRun::Click(const std::optional<Eigen::Vector3d>& object) {
+  if (newest_ == nullptr) return absl::FailedPreconditionError("no frame yet");
+  const FrameId frame = newest_frame();
+  const CameraModel& camera = *source_->info().camera;
+  Eigen::Vector2d pixel(0.5 * camera.width(), 0.5 * camera.height());
+  if (object) {
+    const std::optional<Eigen::Vector2d> at = source_->PixelOf(frame, *object);
+    if (!at || !camera.InImage(*at, 30) || !source_->Visible(frame, *object)) {
+      return absl::NotFoundError("the object is not in view");
+    }
+    pixel = *at;
+  }
+  const std::optional<Eigen::Vector3d> point = object ? object : source_->PointAt(frame, pixel);
+  if (!point) return absl::NotFoundError("there is no surface");
+  AnnotationDraft draft;
+  draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", ++clicks_);
+  draft.author = "expert";
+  draft.target = PixelTarget{frame, pixel};
+  const absl::StatusOr<AnnotationEdit> edit = anchors_->Create(draft, "expert");
+  if (!edit.ok()) return edit.status();
+  anchors_->Committed(edit->change.sequence);
+  // Gaze control learns of it at once, as it would from the server's mailbox.
+  for (Due& due : due_) due.view.annotations = anchors_->Latest();
+  GazeView view;
+  view.map = newest_;
+  view.annotations = anchors_->Latest();
+  view.down_in_world = Eigen::Vector3d::UnitY();
+  loop_->OnView(view);  // without angles: no pose before its time
+  return Clicked{edit->annotation.id, *point};
+}
+
+double GazeRun::TrueError_deg(const Eigen::Vector3d& point_in_world) const {
+  const Eigen::Vector3d seen = TrueCamera().Inverse() * point_in_world;
+  return std::atan2(seen.head<2>().norm(), seen.z()) / kDegree;
+}
+
+double GazeRun::TrueRoll_deg() const {
+  const Eigen::Vector3d down = TrueCamera().rotation.conjugate() * Eigen::Vector3d::UnitY();
+  return std::atan2(-down.x(), down.y()) / kDegree;
+}
+
+GazeRun::DepthClaims GazeRun::CheckDepths() const {
+  DepthClaims claims;
+  if (newest_ == nullptr) return claims;
+  const Eigen::Vector3d eye = source_->WorldFromCamera(newest_frame()).translation;
+  for (const FeatureSnapshot& feature : newest_->features) {
+    ++claims.total;
+    if (!feature.depth_known) continue;
+    const Eigen::Vector3d line = feature.point_in_world - eye;
+    const double believed = line.norm();
+    const std::optional<double> real = source_->SurfaceAlong(eye, line / believed);
+    if (!real || std::abs(believed / *real - 1) > kFalseDepth) ++claims.false_depth;
+  }
+  return claims;
+}
+
+absl::Status GazeRun::Close() {
+  for (const absl::Status& status : {recorder_.Close(), truth_file_.Close(), gaze_file_.Close()}) {
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace saccade
