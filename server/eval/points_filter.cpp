@@ -16,6 +16,9 @@ constexpr std::size_t kBirths = 15;        // for one clone (slam-spec 5.4)
 constexpr std::size_t kEnough = 20;        // matches that need no new features...
 constexpr std::size_t kWorthAClone = 6;    // ...and fewest points that are worth a clone
 constexpr double kRelativeDepthSigma = 0.5;
+constexpr double kGateSigma = 3.0;        // of the search ellipse
+constexpr double kVerifiedStart_s = 1.0;  // before, all matches are true: a start is checked
+constexpr double kLeastWeight = 0.1;      // of a match that is used, as in the tracker
 
 Matrix12d StartCovariance() {
   Vector12d sigma;
@@ -27,7 +30,7 @@ Matrix12d StartCovariance() {
 
 FilterOptions OptionsOf(PointsMode mode) {
   FilterOptions options;
-  options.fej = mode != PointsMode::kSlam;
+  options.fej = mode == PointsMode::kSlamFej;
   return options;
 }
 
@@ -76,7 +79,23 @@ std::vector<Observation> PointsFilter::Match(const PointsFrame& frame) const {
   return matches;
 }
 
-Rigid3 PointsFilter::LinearisationPose(const std::vector<Observation>& matches) {
+void PointsFilter::Falsify(std::vector<Observation>& matches) {
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (Observation& match : matches) {
+    if (0.5 * (uniform(random_) + 1.0) >= options_.false_matches) continue;
+    const auto predicted = match.known_point ? filter_.Predicted(world_.camera, *match.known_point)
+                                             : filter_.Predicted(world_.camera, match.id);
+    const Eigen::Matrix2d ellipse =
+        Eigen::LLT<Eigen::Matrix2d>(predicted->covariance + match.noise).matrixL();
+    Eigen::Vector2d inside;
+    do {
+      inside = {uniform(random_), uniform(random_)};
+    } while (inside.squaredNorm() > 1.0);
+    match.pixel = predicted->at.pixel + kGateSigma * ellipse * inside;
+  }
+}
+
+Rigid3 PointsFilter::LinearisationPose(std::vector<Observation>& matches) {
   std::vector<PoseEvidence> evidence;
   for (const Observation& match : matches) {
     PoseEvidence each;
@@ -92,8 +111,17 @@ Rigid3 PointsFilter::LinearisationPose(const std::vector<Observation>& matches) 
     evidence.push_back(each);
   }
   const PosePrior prior = {filter_.camera().world_from_camera, filter_.PoseCovariance()};
-  return EstimateRobustPose(world_.camera, prior, evidence, RobustPoseOptions(), random_)
-      .world_from_camera;
+  const RobustPose pose =
+      EstimateRobustPose(world_.camera, prior, evidence, RobustPoseOptions(), random_);
+  if (!options_.soft_gate) return pose.world_from_camera;
+  std::vector<Observation> kept;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    if (pose.weights[k] <= kLeastWeight) continue;
+    kept.push_back(matches[k]);
+    kept.back().noise /= pose.weights[k];
+  }
+  matches = std::move(kept);
+  return pose.world_from_camera;
 }
 
 double PointsFilter::MedianInverseRange(const PointsFrame& frame) const {
@@ -147,11 +175,13 @@ absl::StatusOr<PointsStep> PointsFilter::Step(std::size_t index) {
   const PointsFrame& frame = world_.frames[index];
   const MotionNoise noise = {options_.linear_sigma, options_.angular_sigma};
   if (index > 0) filter_.Predict(world_.dt_s, noise);
-  const std::vector<Observation> matches = Match(frame);
+  std::vector<Observation> matches = Match(frame);
+  if (options_.false_matches > 0.0 && index * world_.dt_s >= kVerifiedStart_s) Falsify(matches);
   PointsStep step;
+  const Rigid3 linearisation = LinearisationPose(matches);
   step.matches = static_cast<int>(matches.size());
   if (!matches.empty()) {
-    const auto report = filter_.Update(world_.camera, matches, LinearisationPose(matches));
+    const auto report = filter_.Update(world_.camera, matches, linearisation);
     if (!report.ok()) return report.status();
     step.nis = report->nis;
   }

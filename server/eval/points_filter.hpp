@@ -41,9 +41,12 @@ class PointsFilter {
 
  private:
   std::vector<Observation> Match(const PointsFrame& frame) const;
-  /// Where the tracker would linearise: the robust pose of these matches. All of them are used
-  /// afterwards, whatever their weight: associations are known here, so there are no outliers.
-  Rigid3 LinearisationPose(const std::vector<Observation>& matches);
+  /// Moves some matches to anywhere in their ellipses (PointsOptions::false_matches).
+  void Falsify(std::vector<Observation>& matches);
+  /// Where the tracker would linearise: the robust pose of these matches. Without `soft_gate` all
+  /// of them are used afterwards, whatever their weight; with it they are weighted, and outliers
+  /// leave.
+  Rigid3 LinearisationPose(std::vector<Observation>& matches);
   absl::Status Birth(const PointsFrame& frame, std::size_t matched);
   bool IsKnown(int point) const;
   double MedianInverseRange(const PointsFrame& frame) const;

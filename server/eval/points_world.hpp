@@ -22,6 +22,11 @@ struct PointsOptions {
   double angular_sigma = 6.0;
   /// Points of the start-up target; they come first in `points` and are seen from the start.
   int target_points = 6;
+  /// Share of the matches that are false: anywhere within their search ellipse of 3 sigma.
+  double false_matches = 0.0;
+  /// Matches are weighted by the robust pose, as the tracker does. Off: NIS is an honest
+  /// chi-square.
+  bool soft_gate = false;
 };
 
 struct PointObservation {

@@ -89,4 +89,24 @@ void Covariance::Assign(const Eigen::MatrixXd& full) {
   p_.topLeftCorner(n_, n_) = full;
 }
 
+Eigen::MatrixXd Covariance::Among(const std::vector<int>& rows) const {
+  const auto size = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd block(size, size);
+  for (Eigen::Index c = 0; c < size; ++c) {
+    for (Eigen::Index r = 0; r < size; ++r) block(r, c) = at(rows[r], rows[c]);
+  }
+  return block;
+}
+
+void Covariance::Blend(const std::vector<int>& rows, const Eigen::MatrixXd& before,
+                       const Eigen::MatrixXd& share) {
+  for (Eigen::Index c = 0; c < before.cols(); ++c) {
+    for (Eigen::Index r = 0; r < before.rows(); ++r) {
+      if (rows[r] < rows[c] || share(r, c) <= 0.0) continue;
+      double& number = p_(rows[r], rows[c]);
+      number += share(r, c) * (before(r, c) - number);
+    }
+  }
+}
+
 }  // namespace saccade

@@ -32,6 +32,11 @@ class Covariance {
   void TransformRankOne(const Eigen::VectorXd& d, const Eigen::VectorXd& w);
   /// Zeroes rows and columns [offset, offset + size) and puts `diagonal_block` there.
   void ReplaceBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& diagonal_block);
+  /// The block that these rows (any order) share.
+  Eigen::MatrixXd Among(const std::vector<int>& rows) const;
+  /// That block <- share * before + (1 - share) * itself, number by number.
+  void Blend(const std::vector<int>& rows, const Eigen::MatrixXd& before,
+             const Eigen::MatrixXd& share);
   /// Adds a symmetric block on the diagonal at `offset`.
   void AddBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& block);
   void Clear() { n_ = 0; }

@@ -19,7 +19,8 @@ void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance)
   first_pose_ = camera.world_from_camera;
   anchors_.clear();
   features_.clear();
-  updates_ = 0;
+  updates_ = judged_ = 0;
+  noise_scale_ = 1.0;
   covariance_.Assign(covariance);
   readout_s_ = options_.readout_s;
   readout_offset_ = -1;
@@ -94,7 +95,7 @@ AnchorPoseId FilterState::AddAnchor() {
     for (int r = 0; r < kPoseDim; ++r) covariance_.lower(offset + r, c) = rows(r, c);
   }
   covariance_.AddBlock(offset, rows.leftCols(kPoseDim));
-  anchors_.push_back({next_anchor_, offset, 0, camera_.world_from_camera, first_pose_});
+  anchors_.push_back({next_anchor_, offset, 0, updates_, camera_.world_from_camera, first_pose_});
   return next_anchor_++;
 }
 
@@ -125,11 +126,8 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& bi
       feature.basis.transpose() * birth.bearing_covariance * feature.basis;
   const int size = FeatureDim();
   feature.offset = covariance_.Append(size);
-  if (size == 3) {
-    covariance_.AddBlock(feature.offset, tangent);
-  } else {
-    feature.frozen_covariance = tangent;
-  }
+  feature.birth_covariance = tangent;
+  if (size == 3) covariance_.AddBlock(feature.offset, tangent);
   covariance_.lower(feature.offset + size - 1, feature.offset + size - 1) =
       birth.inverse_range_sigma * birth.inverse_range_sigma;
   features_.push_back(feature);

@@ -11,6 +11,7 @@
 
 #include "server/filter/covariance.hpp"
 #include "server/filter/motion_model.hpp"
+#include "server/filter/parallax.hpp"
 #include "server/filter/point_model.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/scene/map_snapshot.hpp"
@@ -59,7 +60,7 @@ struct UpdateReport {
 };
 
 struct FilterOptions {
-  bool fej = true;  // Jacobians at first estimates (slam-spec 1)
+  bool fej = false;  // Jacobians at first estimates (slam-spec 1); README: why not
   PointForm form = PointForm::kBearingRange;
   /// Read-out time of a rolling shutter, first to last row [s], and how sure that is; sigma 0: as
   /// given, not estimated.
@@ -68,6 +69,9 @@ struct FilterOptions {
   /// Updates after which a change of scale is kept unobserved (README: scale); before, the first
   /// depths are still being sorted out.
   int carry_scale_after = 60;
+  /// Inverse ranges whose clone's matches a turn alone explains to within this many standard
+  /// deviations are left as they are (README: parallax); 0: always corrected.
+  double parallax_sigmas = 3.0;
   double min_inverse_range = 1e-4;  // [1/m]; of points given in metres (the state may pass 0)
 };
 
@@ -144,6 +148,7 @@ class FilterState {
     AnchorPoseId id = 0;
     int offset = 0;
     int users = 0;
+    int born = 0;  // updates before it
     Rigid3 pose;
     Rigid3 first;  // estimate that Jacobians use with fej
   };
@@ -154,7 +159,7 @@ class FilterState {
     Eigen::Vector3d bearing, first_bearing;
     Eigen::Matrix<double, 3, 2> basis, first_basis;
     double inverse_range = 1.0;
-    Eigen::Matrix2d frozen_covariance = Eigen::Matrix2d::Zero();  // of the bearing, range only
+    Eigen::Matrix2d birth_covariance = Eigen::Matrix2d::Zero();  // of the bearing, as first seen
   };
   struct Linearised;  // of all observations: update.cpp
 
@@ -168,7 +173,24 @@ class FilterState {
   void RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size);
   absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
                                           std::span<const Observation> observations,
-                                          const Rigid3& linearisation) const;
+                                          const Rigid3& linearisation,
+                                          const Eigen::VectorXd& step) const;
+  /// From the estimates to where they are linearised: the camera at `linearisation`, everything
+  /// else where the filter expects it then.
+  Eigen::VectorXd StepTo(const Rigid3& linearisation) const;
+  AnchoredPoint MovedPoint(const Feature& feature, const Eigen::VectorXd& step) const;
+  /// The matches of one clone, explained by a turn alone.
+  struct Turned {
+    TurnMisfit misfit;
+    int age = 0;              // updates since the clone was made
+    std::vector<int> ranges;  // offsets of the inverse ranges
+  };
+  std::vector<Turned> ExplainByTurning(const CameraModel& camera,
+                                       std::span<const Observation> observations,
+                                       const Rigid3& linearisation) const;
+  /// Of each of their ranges, in order, the share of its gain that is not taken.
+  Eigen::VectorXd KeptShares(const std::vector<Turned>& turned) const;
+  void JudgeNoise(const UpdateReport& report);
   absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report);
   absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report);
   void Correct(const Eigen::VectorXd& error);
@@ -184,8 +206,10 @@ class FilterState {
   std::vector<Feature> features_;  // rising ids
   AnchorPoseId next_anchor_ = 1;
   double readout_s_ = 0.0;
-  int readout_offset_ = -1;  // -1: not estimated
-  int updates_ = 0;          // since Reset()
+  int readout_offset_ = -1;   // -1: not estimated
+  int updates_ = 0;           // since Reset()
+  int judged_ = 0;            // updates that told of the noise
+  double noise_scale_ = 1.0;  // of matches' errors against their R, squared; up to 1
   Covariance covariance_;
 };
 

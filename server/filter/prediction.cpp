@@ -61,7 +61,7 @@ std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
   PredictedPixel result{*at, hp * h.transpose(), hp.leftCols<6>()};
   if (size == 1) {
     const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
-    result.covariance += d_bearing * feature->frozen_covariance * d_bearing.transpose();
+    result.covariance += d_bearing * feature->birth_covariance * d_bearing.transpose();
   }
   return result;
 }
@@ -102,7 +102,7 @@ FeatureMarginal FilterState::Marginal(FeatureId id) const {
   marginal.covariance_in_camera = in_camera * p * in_camera.transpose();
   if (size == 1) {
     const Matrix3d frozen =
-        d_point.leftCols<2>() * feature->frozen_covariance * d_point.leftCols<2>().transpose();
+        d_point.leftCols<2>() * feature->birth_covariance * d_point.leftCols<2>().transpose();
     marginal.covariance_in_world += frozen;
     marginal.covariance_in_camera += turn * frozen * turn.transpose();
   }

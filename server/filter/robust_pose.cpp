@@ -32,7 +32,8 @@ Vector6d Step(const Rigid3& from, const Rigid3& to) {
 struct Line {
   Vector2d residual;
   Matrix26d d_pose;
-  Matrix2d weight;  // inverse covariance of the residual given the pose
+  Matrix2d weight;    // inverse covariance of the residual given the pose
+  double vote = 0.0;  // how much it can say of the pose, 0 to 1: noise alone against everything
   bool valid = false;
 };
 
@@ -59,6 +60,7 @@ class Problem {
       line.d_pose = at->d_pose;
       line.d_pose.rightCols<3>() = at->d_pose.rightCols<3>() * turn;
       line.weight = (at->covariance + match.noise).inverse();
+      line.vote = std::sqrt(std::max(0.0, match.noise.determinant() * line.weight.determinant()));
     }
   }
 
@@ -79,7 +81,10 @@ class Problem {
   /// Step of the best single match, or none: the prior itself is a hypothesis too.
   Vector6d BestOfOne(const RobustPoseOptions& options, std::mt19937_64& random) {
     Vector6d best = Vector6d::Zero();
-    int best_count = Agreeing(best, options);
+    double best_votes = Agreeing(best, options);
+    const double all_votes =
+        std::accumulate(lines_.begin(), lines_.end(), 0.0,
+                        [](double sum, const Line& line) { return sum + line.vote; });
     std::vector<int> order(lines_.size());
     std::iota(order.begin(), order.end(), 0);
     for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[random() % k]);
@@ -90,11 +95,11 @@ class Problem {
       const Eigen::Matrix<double, 6, 2> gain = prior_.covariance * line.d_pose.transpose();
       const Matrix2d s = line.d_pose * gain + line.weight.inverse();
       const Vector6d step = gain * s.inverse() * line.residual;
-      const int count = Agreeing(step, options);
-      if (count <= best_count) continue;
-      best_count = count;
+      const double votes = Agreeing(step, options);
+      if (votes <= best_votes) continue;
+      best_votes = votes;
       best = step;
-      const double bad = 1.0 - static_cast<double>(count) / static_cast<double>(lines_.size());
+      const double bad = 1.0 - votes / all_votes;
       needed = bad < 1e-3 ? 1.0 : std::log(0.01) / std::log(bad);
     }
     return best;
@@ -128,17 +133,32 @@ class Problem {
     return ratio >= 1.0 ? 0.0 : (1.0 - ratio) * (1.0 - ratio);
   }
 
+  /// Median by votes: features of unknown depth are near by being vague.
   double MedianDistance(const Vector6d& step) {
-    std::vector<double> sorted = Distances(step);
-    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-    return std::sqrt(sorted[sorted.size() / 2]);
+    const std::vector<double>& distances = Distances(step);
+    std::vector<std::pair<double, double>> sorted;  // distance, vote
+    double half = 0.0;
+    for (std::size_t k = 0; k < lines_.size(); ++k) {
+      if (!lines_[k].valid) continue;
+      sorted.emplace_back(distances[k], lines_[k].vote);
+      half += 0.5 * lines_[k].vote;
+    }
+    std::sort(sorted.begin(), sorted.end());
+    for (const auto& [distance, vote] : sorted) {
+      half -= vote;
+      if (half <= 0.0) return std::sqrt(distance);
+    }
+    return 0.0;
   }
 
  private:
-  int Agreeing(const Vector6d& step, const RobustPoseOptions& options) {
+  double Agreeing(const Vector6d& step, const RobustPoseOptions& options) {
     const std::vector<double>& distances = Distances(step);
-    return static_cast<int>(std::count_if(distances.begin(), distances.end(),
-                                          [&](double d) { return d < options.agree_chi2; }));
+    double votes = 0.0;
+    for (std::size_t k = 0; k < lines_.size(); ++k) {
+      if (distances[k] < options.agree_chi2) votes += lines_[k].vote;
+    }
+    return votes;
   }
 
   const CameraModel& camera_;

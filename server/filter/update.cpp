@@ -2,8 +2,11 @@
 #include <absl/strings/str_cat.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <map>
 
 #include "server/filter/filter_state.hpp"
+#include "server/filter/parallax.hpp"
 
 namespace saccade {
 
@@ -28,13 +31,38 @@ struct FilterState::Linearised {
   VectorXd innovation;
 };
 
-absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
-    const CameraModel& camera, std::span<const Observation> observations,
-    const Rigid3& linearisation) const {
+VectorXd FilterState::StepTo(const Rigid3& linearisation) const {
   CameraMotion moved = camera_;
   moved.world_from_camera = linearisation;
-  const Eigen::Matrix<double, 6, 1> step = Minus(moved, camera_).head<6>();
-  const Matrix3d turn = RightJacobianSo3(step.tail<3>());
+  const Eigen::Matrix<double, 6, 1> of_camera = Minus(moved, camera_).head<6>();
+  VectorXd step = VectorXd::Zero(dim());
+  const Eigen::LDLT<Matrix6d> factor(PoseCovariance());
+  if (factor.info() == Eigen::Success && factor.vectorD().minCoeff() > 0.0) {
+    MatrixXd columns(dim(), kPoseDim);
+    covariance_.CopyColumns(0, kPoseDim, columns);
+    step = columns * factor.solve(of_camera);
+    if (!step.allFinite()) step.setZero();
+  }
+  step.head<6>() = of_camera;
+  return step;
+}
+
+AnchoredPoint FilterState::MovedPoint(const Feature& feature, const VectorXd& step) const {
+  AnchoredPoint point = Point(feature, false);
+  const int at = AnchorOf(feature).offset;
+  point.world_from_anchor.translation += step.segment<3>(at);
+  point.world_from_anchor.rotation =
+      (point.world_from_anchor.rotation * ExpQuaternion(step.segment<3>(at + 3))).normalized();
+  const auto part = step.segment(feature.offset, FeatureDim());
+  if (FeatureDim() == 3) MoveBearing(part.head<2>(), point.bearing, point.basis);
+  point.inverse_range += part[part.size() - 1];
+  return point;
+}
+
+absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
+    const CameraModel& camera, std::span<const Observation> observations,
+    const Rigid3& linearisation, const VectorXd& step) const {
+  const Matrix3d turn = RightJacobianSo3(step.segment<3>(3));
   Linearised all;
   all.rows.resize(observations.size());
   all.innovation.resize(2 * static_cast<Eigen::Index>(observations.size()));
@@ -44,16 +72,31 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
     rows.noise = observation.noise;
     rows.d_readout = observation.d_readout;
     std::optional<PixelPrediction> at;
+    Eigen::Vector2d ahead = Eigen::Vector2d::Zero();
     if (observation.known_point) {
       at = PredictFixed(camera, linearisation, *observation.known_point);
     } else if (const Feature* feature = Find(observation.id)) {
-      at = Linearise(camera, linearisation, *feature);
+      at = PredictAnchored(camera, linearisation, MovedPoint(*feature, step));
+      if (at && options_.fej) {
+        if (const auto first = PredictAnchored(camera, linearisation, Point(*feature, true))) {
+          at->d_camera = first->d_camera;
+          at->d_anchor = first->d_anchor;
+          at->d_point = first->d_point;
+        }
+      }
       rows.anchor = AnchorOf(*feature).offset;
       rows.point = feature->offset;
       rows.point_dim = FeatureDim();
-      if (at && rows.point_dim == 1) {
-        const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
-        rows.noise += d_bearing * feature->frozen_covariance * d_bearing.transpose();
+      if (at) {
+        if (!options_.fej) {
+          at->d_anchor.rightCols<3>() *= RightJacobianSo3(step.segment<3>(rows.anchor + 3)).eval();
+        }
+        ahead = at->d_anchor * step.segment<6>(rows.anchor) +
+                at->d_point.rightCols(rows.point_dim) * step.segment(rows.point, rows.point_dim);
+        if (rows.point_dim == 1) {
+          const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
+          rows.noise += d_bearing * feature->birth_covariance * d_bearing.transpose();
+        }
       }
     }
     if (!at) {
@@ -64,8 +107,38 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
     rows.d_camera.rightCols<3>() = at->d_camera.rightCols<3>() * turn;
     rows.d_anchor = at->d_anchor;
     rows.d_point = at->d_point;
+    if (readout_offset_ >= 0) ahead += rows.d_readout * step[readout_offset_];
     all.innovation.segment<2>(2 * static_cast<Eigen::Index>(k)) =
-        observation.pixel - at->pixel + rows.d_camera * step;
+        observation.pixel - at->pixel + rows.d_camera * step.head<6>() + ahead;
+  }
+  return all;
+}
+
+std::vector<FilterState::Turned> FilterState::ExplainByTurning(
+    const CameraModel& camera, std::span<const Observation> observations,
+    const Rigid3& linearisation) const {
+  std::map<AnchorPoseId, std::vector<TurnResidual>> residuals;
+  std::map<AnchorPoseId, Turned> turned;
+  for (const Observation& observation : observations) {
+    if (observation.known_point) continue;
+    const Feature& feature = *Find(observation.id);
+    // As first seen: bearings that were corrected since may have taken up some parallax.
+    AnchoredPoint far = Point(feature, true);
+    far.world_from_anchor = AnchorOf(feature).pose;
+    far.inverse_range = 0.0;
+    const auto at = PredictAnchored(camera, linearisation, far);
+    if (!at) continue;
+    const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
+    residuals[feature.anchor].push_back(
+        {observation.pixel - at->pixel, at->d_camera.rightCols<3>(),
+         observation.noise + d_bearing * feature.birth_covariance * d_bearing.transpose()});
+    turned[feature.anchor].age = updates_ - AnchorOf(feature).born;
+    turned[feature.anchor].ranges.push_back(feature.offset + FeatureDim() - 1);
+  }
+  std::vector<Turned> all;
+  for (auto& [anchor, each] : turned) {
+    each.misfit = FitTurn(residuals[anchor]);
+    all.push_back(std::move(each));
   }
   return all;
 }
@@ -156,20 +229,57 @@ absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, Upd
   return error;
 }
 
+void FilterState::JudgeNoise(const UpdateReport& report) {
+  // R is set with a margin; parallax is judged by how large the matches' errors really are.
+  constexpr double kMemory = 30.0;  // updates
+  constexpr double kLeastScale = 0.05;
+  constexpr int kFewestRows = 20;
+  if (report.rows < kFewestRows) return;
+  // The camera's own six numbers hardly surprise: they take no part.
+  const double seen = std::clamp(report.nis / (report.rows - kPoseDim), kLeastScale, 1.0);
+  noise_scale_ += (seen - noise_scale_) / std::min<double>(kMemory, ++judged_);
+}
+
+VectorXd FilterState::KeptShares(const std::vector<Turned>& turned) const {
+  constexpr double kDoubling = 10.0;  // updates
+  std::vector<double> kept;
+  for (const Turned& each : turned) {
+    // The errors at birth are the same in every frame: what is unlikely once is not for long.
+    const double sigmas = options_.parallax_sigmas + std::log2(1.0 + each.age / kDoubling);
+    const double share = each.misfit.Evidence(sigmas, noise_scale_);
+    kept.insert(kept.end(), each.ranges.size(), 1.0 - share);
+  }
+  return Eigen::Map<VectorXd>(kept.data(), std::ssize(kept));
+}
+
 absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
                                                  std::span<const Observation> observations,
                                                  const Rigid3& linearisation) {
   UpdateReport report;
   if (observations.empty()) return report;
-  const auto all = LineariseAll(camera, observations, linearisation);
+  const VectorXd ahead = StepTo(linearisation);
+  const auto all = LineariseAll(camera, observations, linearisation, ahead);
   if (!all.ok()) return all.status();
-  VectorXd ahead = VectorXd::Zero(dim());  // where it was linearised, from the prediction
-  ahead.segment<3>(0) = linearisation.translation - camera_.world_from_camera.translation;
   ++updates_;
   CarryScale(ahead);
+  std::vector<Turned> turned;
+  if (options_.parallax_sigmas > 0.0)
+    turned = ExplainByTurning(camera, observations, linearisation);
+  std::vector<int> ranges;
+  for (const Turned& each : turned) {
+    ranges.insert(ranges.end(), each.ranges.begin(), each.ranges.end());
+  }
+  const MatrixXd before = covariance_.Among(ranges);
   const bool information = static_cast<int>(all->innovation.size()) > dim();
-  const auto error = information ? InformationStep(*all, report) : KalmanStep(*all, report);
+  auto error = information ? InformationStep(*all, report) : KalmanStep(*all, report);
   if (!error.ok()) return error.status();
+  JudgeNoise(report);
+  // Partial update (README: parallax): inverse ranges take only a share of their gain.
+  const VectorXd kept = KeptShares(turned);
+  for (std::size_t k = 0; k < ranges.size(); ++k) {
+    (*error)[ranges[k]] *= 1.0 - kept[static_cast<Eigen::Index>(k)];
+  }
+  covariance_.Blend(ranges, before, kept * kept.transpose());
   first_pose_ = linearisation;
   CarryScale(*error - ahead);
   Correct(*error);

@@ -32,6 +32,21 @@ AnchoredPoint FromBirth(const Landmark& landmark,
   return from;
 }
 
+/// Whether the picture has no texture around a pixel: a covered lens, a hand before it, a blank
+/// wall.
+bool IsBlank(const cv::Mat& grey, const Eigen::Vector2d& pixel) {
+  constexpr int kRadius_px = 12;
+  constexpr double kTexture = 6.0;  // grey levels; a patch has at least 10
+  const cv::Rect window(static_cast<int>(pixel.x()) - kRadius_px,
+                        static_cast<int>(pixel.y()) - kRadius_px, 2 * kRadius_px + 1,
+                        2 * kRadius_px + 1);
+  const cv::Rect inside = window & cv::Rect({0, 0}, grey.size());
+  if (inside.empty()) return true;
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(grey(inside), mean, deviation);
+  return deviation[0] < kTexture;
+}
+
 }  // namespace
 
 FrameMatcher::FrameMatcher(const TrackerOptions& options)
@@ -115,7 +130,7 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   const Landmark& landmark = *map.Find(match.id);
   const Eigen::LLT<Matrix6d> factor(prior.covariance);
   const auto expected = PixelGivenPose(camera, prior, factor, match.point, match.predicted, pose);
-  match.found = false;
+  match.found = match.hidden = false;
   match.weight = 0.0;
   if (!expected || !camera.InImage(expected->pixel, kBorder_px)) return;
   // Rows are exposed one after the other: what is seen in row v is seen `late` read-outs after
@@ -146,8 +161,10 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
       result.status == SearchStatus::kBadInput) {
     return;
   }
-  match.searched = true;
   match.found = result.found();
+  // Where there is nothing at all, something hides the feature: no attempt (slam-spec 5.6).
+  match.hidden = !match.found && IsBlank(pyramid.level(0), centre);
+  match.searched = !match.hidden;
   if (!match.found) return;
   match.pixel = result.pixel;
   book_row(result.pixel.y());
@@ -201,6 +218,7 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
   for (const LandmarkMatch& match : in_view) {
     matches.attempted += match.searched ? 1 : 0;
     matches.accepted += match.accepted() ? 1 : 0;
+    matches.hidden += match.hidden ? 1 : 0;
   }
   return matches;
 }

@@ -18,6 +18,7 @@ struct LandmarkMatch {
   std::variant<AnchoredPoint, Eigen::Vector3d> point;  // as the filter has it; known points
   bool searched = false;
   bool found = false;
+  bool hidden = false;  // nothing but blank where it should be: no attempt
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // found, else where it was expected
   /// `pixel` less this is where it would have been seen in mid-exposure [px] (rolling shutter).
   Eigen::Vector2d row_shift = Eigen::Vector2d::Zero();
@@ -33,6 +34,7 @@ struct FrameMatches {
   RobustPose pose;
   int attempted = 0;
   int accepted = 0;
+  int hidden = 0;
   bool surprised = false;  // few of the first stage agree: the camera moved unexpectedly
 };
 

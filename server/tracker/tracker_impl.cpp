@@ -34,6 +34,8 @@ FilterOptions MakeFilterOptions(const TrackerOptions& options, const CameraModel
   filter.readout_sigma_s =
       filter.readout_s > 0.0 ? kSurely * filter.readout_s : options.readout_sigma_s;
   filter.fej = options.fej;
+  filter.parallax_sigmas = options.parallax_sigmas;
+  filter.carry_scale_after = options.carry_scale_after;
   filter.form = options.range_only ? PointForm::kRangeOnly : PointForm::kBearingRange;
   return filter;
 }
@@ -228,7 +230,10 @@ void Tracker::Impl::Manage(const Frame& frame) {
     });
   }
   keeper_.Retire(frames_, filter_, map_);
-  if (!telling) return;
+  // With most of the view covered the little that is left is no place to start features from: it
+  // would be lost when the cover goes (T46).
+  const bool covered = matches_.hidden > matches_.attempted;
+  if (!telling || covered) return;
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
                random_);

@@ -22,13 +22,15 @@ struct TrackerOptions {
   double angular_acceleration_sigma_rad_s2 = 6.0;
 
   // Filter.
-  bool fej = true;                  // Jacobians at first estimates (slam-spec 1)
+  bool fej = false;                 // Jacobians at first estimates (slam-spec 1)
   bool range_only = false;          // ESID: bearings frozen at birth; false: SID
   double pixel_sigma_px = 0.5;      // of a match at the picture's centre, lens and warp included
   double pixel_sigma_growth = 1.0;  // sigma (1 + growth d / d_max): lens models fit worse outside
   /// Of the rolling shutter's read-out time where camera.yaml is silent; 0: taken as global.
   double readout_sigma_s = 0.015;
-  double robust_cutoff = 4.5;  // Mahalanobis distance from which a match is ignored
+  double parallax_sigmas = 3.0;  // of a clone's matches, before they correct depth (T13)
+  int carry_scale_after = 60;    // updates, before a change of scale is kept unobserved
+  double robust_cutoff = 4.5;    // Mahalanobis distance from which a match is ignored
 
   // Search (slam-spec 5.1).
   int first_stage = 20;         // features searched widely, for the robust pose

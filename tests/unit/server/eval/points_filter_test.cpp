@@ -51,5 +51,39 @@ TEST(PointsFilter, FullSlamStaysWithinTwiceTheConsistentError) {
   EXPECT_LT(means.worst_m, 0.10);
 }
 
+/// RMS of the camera's position error of one run [m].
+double PositionRms(std::uint64_t seed, double seconds, double false_matches) {
+  PointsOptions options;
+  options.seed = seed;
+  options.duration_s = seconds;
+  options.false_matches = false_matches;
+  options.soft_gate = true;
+  const PointsWorld world = MakePointsWorld(options);
+  PointsFilter filter(world, options, PointsMode::kSlam);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < world.frames.size(); ++i) {
+    const auto step = filter.Step(i);
+    EXPECT_TRUE(step.ok()) << step.status();
+    if (!step.ok()) return 1e9;
+    sum += step->position_error_m * step->position_error_m;
+  }
+  return std::sqrt(sum / static_cast<double>(world.frames.size()));
+}
+
+// T15: 30 % of the matches anywhere within their gates.
+TEST(PointsFilter, FalseMatchesHardlyHurtT15) {
+  constexpr int kRuns = 8;
+  double clean = 0.0, dirty = 0.0;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    const double without = PositionRms(seed, 20, 0.0), with = PositionRms(seed, 20, 0.3);
+    clean += without * without / kRuns;
+    dirty += with * with / kRuns;
+  }
+  const double ratio = std::sqrt(dirty / clean);
+  std::printf("T15: position error %.2f mm clean, %.2f mm with 30 %% false matches: %.2f times\n",
+              1e3 * std::sqrt(clean), 1e3 * std::sqrt(dirty), ratio);
+  EXPECT_LT(ratio, 1.5);
+}
+
 }  // namespace
 }  // namespace saccade
