@@ -196,12 +196,12 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kRedo:
       return RunAnnotations(options, connection);
     case Command::kFixate:
+    case Command::kStop:
     case Command::kRelease:
     case Command::kHome:
-      break;
+      return RunGaze(options, connection);
   }
-  return absl::UnimplementedError(
-      "not available yet: no mount; the camera is fixed to the wearer, so ask them to turn");
+  return absl::InternalError("unknown command");
 }
 
 }  // namespace saccade::cli

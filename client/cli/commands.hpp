@@ -18,5 +18,6 @@ absl::Status RunMap(const Options& options, net::Connection& connection);
 absl::Status RunSnapshot(const Options& options, net::Connection& connection);
 absl::Status RunAnnotate(const Options& options, net::Connection& connection);
 absl::Status RunAnnotations(const Options& options, net::Connection& connection);
+absl::Status RunGaze(const Options& options, net::Connection& connection);
 
 }  // namespace saccade::cli

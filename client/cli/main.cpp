@@ -37,6 +37,11 @@ int main(int argc, char** argv) {
     if (keeps_session) options.session_id = cli::LoadSession(options.server);
     const auto connection = net::Connection::Create(options);
     if (!connection.ok()) return Fail(connection.status().message());
+    // Who holds the camera wants to be able to stop it from another terminal.
+    if (parsed.options->command == cli::Command::kFixate) {
+      const absl::StatusOr<std::string> joined = (*connection)->Session();
+      if (joined.ok()) cli::SaveSession(options.server, *joined);
+    }
     const absl::Status status = cli::Run(*parsed.options, **connection);
     const std::string& session = (*connection)->session_id();
     if (keeps_session && session != options.session_id) cli::SaveSession(options.server, session);

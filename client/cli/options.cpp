@@ -122,14 +122,26 @@ void AddAnnotations(CLI::App& app, Options& options) {
   annotations->add_subcommand("redo", "Make it again");
 }
 
-void AddGaze(CLI::App& app, Raw& raw) {
-  CLI::App* fixate = app.add_subcommand("fixate", "Turn the camera to a point and hold it there");
-  fixate->add_option("--annotation", raw.annotation, "Id of an annotation");
-  fixate->add_option("--feature", raw.feature, "Id of a feature")->check(Id());
-  fixate->add_option("--point", raw.point, "X,Y,Z in world [m]")
-      ->check(Checked([](const std::string& t) { return ParseNumbers(t, 3); }, "X,Y,Z"));
+void AddGaze(CLI::App& app, Options& options, Raw& raw) {
+  CLI::App* fixate = app.add_subcommand(
+      "fixate", "Turn the camera to a point and hold it there until interrupted (Ctrl-C)");
+  CLI::Option* annotation =
+      fixate->add_option("--annotation", raw.annotation, "Id of an annotation");
+  CLI::Option* feature =
+      fixate->add_option("--feature", raw.feature, "Id of a feature")->check(Id());
+  CLI::Option* point =
+      fixate->add_option("--point", raw.point, "X,Y,Z in world [m]")
+          ->check(Checked([](const std::string& t) { return ParseNumbers(t, 3); }, "X,Y,Z"));
+  annotation->excludes(feature)->excludes(point);
+  feature->excludes(point);
+  fixate->add_flag("--fast", options.fast, "As fast as the mount can, instead of 30 deg/s");
+  fixate->add_option("--for", options.gaze_s, "Let go after so many seconds")
+      ->check(CLI::Range(0.001, 1e9));
+  app.add_subcommand("stop", "Stop the camera where it is");
   app.add_subcommand("release", "Let the camera go");
-  app.add_subcommand("home", "Turn the camera straight ahead");
+  CLI::App* home = app.add_subcommand("home", "Turn the camera straight ahead");
+  home->add_option("--for", options.gaze_s, "Give up after so many seconds (20)")
+      ->check(CLI::Range(0.001, 1e9));
 }
 
 Command CommandOf(const CLI::App& app) {
@@ -146,6 +158,7 @@ Command CommandOf(const CLI::App& app) {
       {"undo", Command::kUndo},
       {"redo", Command::kRedo},
       {"fixate", Command::kFixate},
+      {"stop", Command::kStop},
       {"release", Command::kRelease},
       {"home", Command::kHome}};
   const CLI::App* chosen = app.get_subcommands().front();
@@ -174,6 +187,17 @@ absl::Status FinishDraft(const Raw& raw, AnnotationDraft& draft) {
   }
   if (ink) draft.ink_px = *ParseStroke(raw.stroke);
   return absl::OkStatus();
+}
+
+absl::StatusOr<GazeTarget> GazeOf(const Raw& raw) {
+  if (!raw.annotation.empty()) return GazeAnnotation{raw.annotation};
+  if (raw.feature) return GazeFeature{*raw.feature};
+  if (raw.point.empty()) {
+    return absl::InvalidArgumentError(
+        "fixate needs --annotation ID, --feature ID or --point X,Y,Z");
+  }
+  const std::vector<double> xyz = *ParseNumbers(raw.point, 3);
+  return GazePoint{{xyz[0], xyz[1], xyz[2]}};
 }
 
 int Usage(absl::string_view problem) {
@@ -224,7 +248,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddMapAndPictures(app, options, raw);
   AddAnnotate(app, options, raw);
   AddAnnotations(app, options);
-  AddGaze(app, raw);
+  AddGaze(app, options, raw);
 
   try {
     app.parse(argc, argv);
@@ -241,6 +265,11 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
       std::chrono::milliseconds(static_cast<std::int64_t>(raw.timeout_s * 1000));
   if (absl::Status valid = options.connection.Validate(); !valid.ok()) {
     return {std::nullopt, Usage(valid.message())};
+  }
+  if (options.command == Command::kFixate) {
+    absl::StatusOr<GazeTarget> target = GazeOf(raw);
+    if (!target.ok()) return {std::nullopt, Usage(target.status().message())};
+    options.gaze = *std::move(target);
   }
   if (options.command == Command::kAnnotate) {
     if (absl::Status done = FinishDraft(raw, options.draft); !done.ok()) {

@@ -11,6 +11,7 @@
 
 #include "client/net/connection.hpp"
 #include "shared/scene/annotation.hpp"
+#include "shared/scene/gaze.hpp"
 
 namespace saccade::cli {
 
@@ -29,6 +30,7 @@ enum class Command {
   kUndo,
   kRedo,
   kFixate,
+  kStop,
   kRelease,
   kHome,
 };
@@ -44,6 +46,9 @@ struct Options {
   std::string id;                              // show, delete: UUID or the beginning of one
   double watch_s = 0;                          // watch: end after this time; 0: never
   AnnotationDraft draft;                       // annotate; frame_id 0 until `frame` is known
+  GazeTarget gaze;                             // fixate
+  bool fast = false;                           // fixate: at the mount's own limits
+  double gaze_s = 0;                           // fixate, home: end after this time; 0: see --help
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".

@@ -233,6 +233,28 @@ json ToJson(const std::vector<Annotation>& annotations) {
   return list;
 }
 
+json ToJson(const GazeSnapshot& state) {
+  const auto pilot_name = [](const GazePilot& pilot) { return json(pilot.display_name); };
+  json queue = json::array();
+  for (const GazePilot& waiting : state.queue) queue.push_back(pilot_name(waiting));
+  json result = {{"mode", ToString(state.mode)},
+                 {"arrived", state.arrived},
+                 {"target_lost", state.target_lost},
+                 {"reachable", state.reachable},
+                 {"miss_rad", state.miss_rad},
+                 {"fast", state.fast},
+                 {"problem", state.problem},
+                 {"pilot", state.pilot ? pilot_name(*state.pilot) : json()},
+                 {"queue", queue},
+                 {"paused", state.paused},
+                 {"handovers", state.handovers},
+                 {"last_handover", state.last_handover},
+                 {"error_rad", state.error_rad ? json(*state.error_rad) : json()},
+                 {"joints_rad", state.joints_rad ? Numbers(*state.joints_rad) : json()}};
+  result["target_in_world_m"] = state.target_in_world ? Numbers(*state.target_in_world) : json();
+  return result;
+}
+
 json ToJson(const net::WatchEvent& event) {
   if (const auto* pose = std::get_if<MapSnapshot>(&event)) return {{"pose", ToJson(*pose)}};
   if (const auto* change = std::get_if<net::AnnotationChange>(&event)) {

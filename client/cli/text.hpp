@@ -27,6 +27,7 @@ nlohmann::json ToJson(const net::MapState& map);
 nlohmann::json ToJson(const Annotation& annotation);
 nlohmann::json ToJson(const std::vector<Annotation>& annotations);
 nlohmann::json ToJson(const net::WatchEvent& event);
+nlohmann::json ToJson(const GazeSnapshot& state);
 
 /// "x 0.123 y -0.045 z 1.200 m"; of a world without scale, without the unit.
 std::string PointText(const Eigen::Vector3d& point, bool metric);

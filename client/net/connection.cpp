@@ -10,9 +10,11 @@
 
 #include "client/net/convert.hpp"
 #include "saccade/v1/annotation.grpc.pb.h"
+#include "saccade/v1/gaze.grpc.pb.h"
 #include "saccade/v1/map.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 #include "shared/wire/from_proto.hpp"
+#include "shared/wire/gaze.hpp"
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade::net {
@@ -64,7 +66,8 @@ class Connection::Impl {
                                            ChannelArguments())),
         session_(v1::SessionService::NewStub(channel_)),
         map_(v1::MapService::NewStub(channel_)),
-        annotation_(v1::AnnotationService::NewStub(channel_)) {}
+        annotation_(v1::AnnotationService::NewStub(channel_)),
+        gaze_(v1::GazeService::NewStub(channel_)) {}
 
   // One unary call with this connection's deadline.
   template <typename Stub, typename Request, typename Response>
@@ -177,6 +180,7 @@ class Connection::Impl {
   const std::unique_ptr<v1::SessionService::Stub> session_;
   const std::unique_ptr<v1::MapService::Stub> map_;
   const std::unique_ptr<v1::AnnotationService::Stub> annotation_;
+  const std::unique_ptr<v1::GazeService::Stub> gaze_;
 };
 
 Connection::Connection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -281,6 +285,56 @@ absl::StatusOr<std::string> Connection::Redo() {
                                        v1::RedoAnnotationRequest());
   if (!response.ok()) return response.status();
   return response->description();
+}
+
+absl::StatusOr<GazeSnapshot> Connection::GetGaze() {
+  auto response =
+      impl_->Call(*impl_->gaze_, &v1::GazeService::Stub::GetState, v1::GetGazeStateRequest());
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->state(), "state");
+}
+
+absl::StatusOr<Lease> Connection::AcquireLease(const std::string& lease_id) {
+  v1::AcquireLeaseRequest request;
+  request.set_lease_id(lease_id);
+  auto response =
+      impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::AcquireLease, std::move(request));
+  if (!response.ok()) return response.status();
+  return Lease{response->granted(),
+               response->lease_id(),
+               response->queue_position(),
+               {response->pilot().session_id(), response->pilot().display_name()}};
+}
+
+absl::Status Connection::ReleaseLease() {
+  return impl_
+      ->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::ReleaseLease,
+                      v1::ReleaseLeaseRequest())
+      .status();
+}
+
+absl::StatusOr<GazeSnapshot> Connection::Fixate(const GazeTarget& target, bool fast) {
+  v1::FixateRequest request;
+  *request.mutable_target() = wire::ToProto(target);
+  request.set_fast(fast);
+  auto response =
+      impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::Fixate, std::move(request));
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->state(), "state");
+}
+
+absl::StatusOr<GazeSnapshot> Connection::StopFixating() {
+  auto response = impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::StopFixating,
+                                       v1::StopFixatingRequest());
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->state(), "state");
+}
+
+absl::StatusOr<GazeSnapshot> Connection::Home() {
+  auto response =
+      impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::Home, v1::HomeRequest());
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->state(), "state");
 }
 
 absl::Status Connection::Watch(const std::function<bool(const WatchEvent&)>& on_event) {

@@ -40,6 +40,8 @@ struct ConnectionOptions {
 ///   anything else       as the server said
 class Connection {
  public:
+  using GazeAnswer = absl::StatusOr<GazeSnapshot>;
+
   /// Does not touch the network: the first call does.
   static absl::StatusOr<std::unique_ptr<Connection>> Create(const ConnectionOptions& options);
   ~Connection();
@@ -69,6 +71,15 @@ class Connection {
   /// What was undone or redone, in words. Acts on this session's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();
+
+  GazeAnswer GetGaze();
+  /// Asks for the lease, or renews it: at least every 200 ms, or it is gone.
+  absl::StatusOr<Lease> AcquireLease(const std::string& lease_id);
+  absl::Status ReleaseLease();
+  /// Need the lease. The answer is the state just after.
+  GazeAnswer Fixate(const GazeTarget& target, bool fast);
+  GazeAnswer StopFixating();
+  GazeAnswer Home();
 
   /// Delivers poses, annotations, statistics and presence until `on_event` returns false (OK), the
   /// server goes away (an error) or closes the stream (OK). Acknowledges as it reads, so that what

@@ -8,6 +8,7 @@
 
 #include "shared/camera/camera_model.hpp"
 #include "shared/scene/annotation.hpp"
+#include "shared/scene/gaze.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade::net {
@@ -73,6 +74,14 @@ struct AnnotationChange {
   bool full = false;  // the first of a subscription: everything there is
   std::vector<Annotation> upserted;
   std::vector<std::string> removed_ids;
+};
+
+/// Whether one may steer the camera.
+struct Lease {
+  bool granted = false;
+  std::string lease_id;              // if granted: renew with it
+  std::uint32_t queue_position = 0;  // from 1, if not
+  GazePilot pilot;                   // who has it
 };
 
 struct SourceEnd {

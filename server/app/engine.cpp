@@ -10,6 +10,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "server/app/crop_view.hpp"
+
 namespace saccade {
 namespace {
 
@@ -31,8 +33,14 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source,
       tracker_(std::move(tracker)),
       inbox_(options_.mailbox),
       clock_(/*paced=*/!options_.every_frame),
+      upright_(source_->info().target.has_value()),
       stills_({.capacity = kStillsWaiting, .when_full = WhenFull::kRefuse},
               [this](StillRequest request) { MakeStill(std::move(request)); }) {
+  if (options_.mount) {
+    gaze_ = std::make_unique<GazeRunner>(
+        options_.mount, options_.gaze, options_.mailbox,
+        [this](const std::shared_ptr<const GazeSnapshot>& state) { sink_.OnGaze(state); });
+  }
   views_[static_cast<std::size_t>(VideoView::kRaw)] = std::make_unique<ViewEncoder>(
       VideoView::kRaw, options_.video_bit_rate_bit_s,
       [](const TrackedFrame& frame) { return PictureOf(*frame.frame); }, sink_);
@@ -68,6 +76,7 @@ absl::StatusOr<std::unique_ptr<Engine>> Engine::Create(EngineOptions options,
 }
 
 void Engine::Start() {
+  if (gaze_) gaze_->Start();
   tracker_thread_ = std::jthread([this](std::stop_token stop) { RunTracker(stop); });
   source_thread_ = std::jthread([this](std::stop_token stop) { RunSource(stop); });
   clock_thread_ = std::jthread([this](std::stop_token stop) { RunClock(stop); });
@@ -81,6 +90,7 @@ void Engine::Stop() {
   for (std::jthread* thread : {&source_thread_, &tracker_thread_, &clock_thread_}) {
     if (thread->joinable()) thread->join();
   }
+  if (gaze_) gaze_->Stop();
   for (const Command& command : inbox_.Close()) {
     Fail(command, absl::UnavailableError("the server is shutting down"));
   }
@@ -122,6 +132,9 @@ void Engine::RunTracker(std::stop_token stop) {
 
 void Engine::Track(Frame frame) {
   const Timestamp begin_ns = MonotonicNow();
+  if (options_.mount && !options_.crop && !frame.mount) {
+    frame.mount = options_.mount->AnglesAt(frame.capture_time_ns);
+  }
   auto shared = std::make_shared<const Frame>(std::move(frame));
   TrackedFrame next{.frame = shared, .tracked = {}};
   TrackedEvent& tracked = next.tracked;
@@ -136,11 +149,34 @@ void Engine::Track(Frame frame) {
     std::fprintf(stderr, "anchor %s moved %.1f mm: %s\n", moved.id.c_str(),
                  1e3 * moved.delta_in_world.norm(), moved.cause.c_str());
   }
+  TellGaze(*shared);
   const Timestamp end_ns = MonotonicNow();
   last_->tracked.stages.tracked_ns = end_ns;
   tracked_ns_ = end_ns;
   track_ms_.Add(end_ns, 1e-6 * static_cast<double>(end_ns - begin_ns));
   Publish();
+}
+
+void Engine::TellGaze(const Frame& frame) {
+  if (!gaze_) return;
+  GazeView view{.map = last_->tracked.snapshot,
+                .annotations = book_->Latest(),
+                .angles = options_.crop ? MountAngles{} : frame.mount,
+                .down_in_world = std::nullopt};
+  if (upright_ && view.map->metric) view.down_in_world = Eigen::Vector3d::UnitY();
+  gaze_->OnView(std::move(view));
+}
+
+std::shared_ptr<const GazeSnapshot> Engine::gaze() const {
+  static const auto kNoMount = std::make_shared<const GazeSnapshot>();
+  return gaze_ ? gaze_->snapshot() : kNoMount;
+}
+
+absl::Status Engine::SubmitGaze(GazeCommand command) {
+  if (gaze_) return gaze_->Submit(std::move(command));
+  return absl::FailedPreconditionError(
+      "gaze: no mount: the camera is fixed to the wearer, so ask them to turn (or start the "
+      "server with --mount)");
 }
 
 // Without a new frame: commands may have changed annotations, the store may have answered.
@@ -240,8 +276,26 @@ void Engine::MakeStill(StillRequest request) {
 }
 
 cv::Mat Engine::DrawAugmented(const TrackedFrame& frame) const {
-  return Augment(*frame.frame, *frame.tracked.snapshot, *frame.tracked.annotations,
-                 options_.overlay);
+  OverlayOptions overlay = options_.overlay;
+  const std::shared_ptr<const GazeSnapshot> state = gaze();
+  if (state->target) {  // green
+    if (const auto* feature = std::get_if<GazeFeature>(&*state->target)) {
+      overlay.fixated_feature = feature->id;
+    } else if (const auto* annotation = std::get_if<GazeAnnotation>(&*state->target)) {
+      overlay.fixated_annotation = annotation->id;
+    }
+  }
+  cv::Mat picture =
+      Augment(*frame.frame, *frame.tracked.snapshot, *frame.tracked.annotations, overlay);
+  if (options_.crop) {
+    const Eigen::Quaterniond world_from_camera = frame.tracked.snapshot->world_from_camera.rotation;
+    picture =
+        CropView(picture, *frame.tracked.camera, *options_.crop,
+                 state->world_from_view ? world_from_camera.conjugate() * *state->world_from_view
+                                        : Eigen::Quaterniond::Identity());
+  }
+  if (state->guidance_rad) DrawGuidance(*state->guidance_rad, picture);
+  return picture;
 }
 
 EngineStatistics Engine::Statistics() const {

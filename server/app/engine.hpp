@@ -11,6 +11,7 @@
 #include "server/anchors/frame_ring.hpp"
 #include "server/app/frame_clock.hpp"
 #include "server/app/frame_tracker.hpp"
+#include "server/app/gaze_runner.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/capture/frame_source.hpp"
 #include "server/overlay/overlay.hpp"
@@ -28,12 +29,18 @@ struct EngineOptions {
   std::size_t mailbox = 64;      // commands that may wait for the tracker thread
   AnchorOptions anchors;
   OverlayOptions overlay;
+  std::shared_ptr<Mount> mount;  // null: the camera is fixed to the wearer
+  /// Digital gaze: `mount` turns this crop of the picture, which the augmented view then shows, and
+  /// the camera itself is fixed.
+  std::optional<CameraIntrinsics> crop;
+  GazeOptions gaze;
 };
 
 /// Capture to packets: owns the threads and what they share.
 ///
 ///   source thread   FrameSource::Next
 ///   tracker thread  commands, tracker, anchors; publishes to the sink
+///   gaze thread     where there is a mount: steers it
 ///   view threads    one per view: draw, code
 ///   still thread    PNG for GetFrame
 ///   clock thread    statistics once a second
@@ -54,6 +61,8 @@ class Engine : public Backend {
   absl::Status Submit(Command command) override;
   const ServerFacts& facts() const override { return facts_; }
   std::shared_ptr<const AnnotationList> annotations() const override;
+  std::shared_ptr<const GazeSnapshot> gaze() const override;
+  absl::Status SubmitGaze(GazeCommand command) override;
   void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) override;
   void SetVideoDemand(VideoView view, bool wanted) override;
   void RequestKeyFrame(VideoView view) override;
@@ -78,6 +87,7 @@ class Engine : public Backend {
   void RunTracker(std::stop_token stop);
   void RunClock(std::stop_token stop);
   void Track(Frame frame);
+  void TellGaze(const Frame& frame);
   void Settle();
   void Publish();
   void Execute(Command command);
@@ -105,6 +115,9 @@ class Engine : public Backend {
   RollingStatistics captured_, track_ms_;
   std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, bad_frames_ = 0;
   std::atomic<Timestamp> tracked_ns_ = 0;  // when a frame last came
+
+  const bool upright_;                // the target's frame is the world's, and knows where down is
+  std::unique_ptr<GazeRunner> gaze_;  // null: no mount
 
   Runner<StillRequest> stills_;
   std::jthread source_thread_, tracker_thread_, clock_thread_;

@@ -1,16 +1,48 @@
 #include "server/app/open_source.hpp"
 
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
+
 #include "server/capture/source.hpp"
+#include "server/mount/crop_mount.hpp"
+#include "server/mount/sim_mount.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {
 namespace {
 
+absl::StatusOr<std::shared_ptr<SimMount>> OpenSimMount(const ServerConfig& config) {
+  SimMountOptions options;
+  options.wall_clock = true;
+  options.seed = config.seed;
+  if (!config.config_file.empty()) {
+    absl::Status loaded = options.mount.LoadToml(config.config_file);
+    if (!loaded.ok()) return loaded;
+  }
+  return std::make_shared<SimMount>(options);
+}
+
+/// "WxH", or nothing: half of the picture.
+absl::StatusOr<std::shared_ptr<CropMount>> OpenCrop(const std::string& size,
+                                                    const CameraIntrinsics& camera) {
+  int width = camera.width / 4 * 2, height = camera.height / 4 * 2;
+  const std::pair<std::string, std::string> parts = absl::StrSplit(size, absl::MaxSplits('x', 1));
+  if (!size.empty() &&
+      !(absl::SimpleAtoi(parts.first, &width) && absl::SimpleAtoi(parts.second, &height))) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--mount: crop:", size, " is not crop:WxH, for example crop:480x360"));
+  }
+  return CropMount::Create(camera, width, height);
+}
+
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenSim(const ServerConfig& config,
                                                      absl::string_view rest,
-                                                     const SourceOptions& options) {
+                                                     const SourceOptions& options,
+                                                     const std::shared_ptr<SimMount>& head) {
   absl::StatusOr<std::unique_ptr<SimSource>> source = SimSource::OpenUri(rest, options, config.gl);
   if (!source.ok()) return source.status();
+  if (head) (*source)->DriveHead(head);
   if (!config.sim_truth.empty()) {
     if (absl::Status truth = (*source)->WriteTruthTo(config.sim_truth); !truth.ok()) return truth;
   }
@@ -19,15 +51,31 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenSim(const ServerConfig& config,
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenConfiguredSource(const ServerConfig& config) {
+absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config) {
+  std::shared_ptr<SimMount> head;
+  if (config.mount == "sim") {
+    absl::StatusOr<std::shared_ptr<SimMount>> made = OpenSimMount(config);
+    if (!made.ok()) return made.status();
+    head = *std::move(made);
+  }
   SourceRegistry sources = CaptureSources();
-  sources.Add("sim", [&config](absl::string_view rest, const SourceOptions& options) {
-    return OpenSim(config, rest, options);
+  sources.Add("sim", [&](absl::string_view rest, const SourceOptions& options) {
+    return OpenSim(config, rest, options, head);
   });
   SourceOptions options;
   options.realtime = !config.every_frame;
   options.camera_file = config.camera_file;
-  return sources.Open(config.source, options);
+  absl::StatusOr<std::unique_ptr<FrameSource>> source = sources.Open(config.source, options);
+  if (!source.ok()) return source.status();
+  OpenedSource opened{*std::move(source), head, std::nullopt};
+  if (config.mount.rfind("crop:", 0) == 0) {
+    absl::StatusOr<std::shared_ptr<CropMount>> crop =
+        OpenCrop(config.mount.substr(5), opened.source->info().camera->intrinsics());
+    if (!crop.ok()) return crop.status();
+    opened.crop = (*crop)->view();
+    opened.mount = *std::move(crop);
+  }
+  return opened;
 }
 
 }  // namespace saccade

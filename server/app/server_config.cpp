@@ -26,7 +26,7 @@ struct Raw {
 void AddFlags(CLI::App& app, Raw& raw) {
   app.set_version_flag("--version", std::string("saccade-server ") + kVersion);
   app.add_option("--source", raw.source, "sim:desk[?...] | dataset:DIR");
-  app.add_option("--mount", raw.mount, "none");
+  app.add_option("--mount", raw.mount, "none | sim | crop:[WxH]");
   app.add_option("--config", raw.config, "TOML file; flags win over it");
   app.add_option("--data-dir", raw.data_dir, "annotations are kept here");
   app.add_option("--camera", raw.camera, "camera.yaml instead of the source's own");
@@ -77,7 +77,8 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
         return Bad(absl::StrCat(raw.config, ": unknown key video.", *keys.begin()));
       left.erase("video");
     }
-    left.erase("tracker");  // read by TrackerOptions::LoadToml
+    // Read by TrackerOptions, GazeOptions and MountOptions.
+    for (const char* table : {"tracker", "gaze", "mount_model"}) left.erase(table);
     if (!left.empty()) return Bad(absl::StrCat(raw.config, ": unknown key ", *left.begin()));
   } catch (const std::exception& error) {
     return Bad(absl::StrCat("--config: ", raw.config, ": ", error.what()));
@@ -108,13 +109,28 @@ absl::Status CheckAddresses(const Raw& raw, ServerConfig& config) {
   return absl::OkStatus();
 }
 
+absl::Status CheckMount(const Raw& raw) {
+  if (raw.mount == "none") return absl::OkStatus();
+  if (raw.mount.rfind("crop:", 0) == 0) return absl::OkStatus();
+  if (raw.mount != "sim") {
+    return Bad(absl::StrCat("--mount: '", raw.mount,
+                            "' is not served by this version: use none or sim, or crop:"));
+  }
+  if (raw.source.rfind("sim:", 0) != 0) {
+    return Bad("--mount: sim turns the camera of a sim: source only");
+  }
+  if (raw.speed == "max") {
+    return Bad("--mount: a head moves by the clock: leave --speed max out");
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   ServerConfig config;
   if (raw.source.empty()) return Bad("--source is missing, e.g. --source sim:desk");
   config.source = raw.source;
-  if (raw.mount != "none") {
-    return Bad(absl::StrCat("--mount: '", raw.mount, "' is not served by this version: use none"));
-  }
+  if (absl::Status mount = CheckMount(raw); !mount.ok()) return mount;
+  config.mount = raw.mount;
   config.data_dir = raw.data_dir.empty() ? DefaultDataDir() : std::filesystem::path(raw.data_dir);
   config.camera_file = raw.camera;
   config.insecure = raw.insecure;

@@ -36,10 +36,11 @@ struct ServerConfig {
   std::optional<double> run_for_s;
   std::filesystem::path sim_truth;
   // Only in the file: reasons to change them are rare.
-  int video_bit_rate_bit_s = 0;       // video.bit_rate_bit_s; 0: by picture size
-  std::filesystem::path web_root;     // web_root
-  std::uint64_t seed = 1;             // seed
-  std::filesystem::path config_file;  // its [tracker] table is the tracker's to read; may be empty
+  int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size
+  std::filesystem::path web_root;  // web_root
+  std::uint64_t seed = 1;          // seed
+  std::filesystem::path
+      config_file;  // its [tracker], [gaze] and [mount_model] tables are theirs to read
 
   /// Parses the command line. An error is bad usage (exit 2); `--help` and `--version` print and
   /// give nothing.

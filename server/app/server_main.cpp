@@ -53,24 +53,33 @@ std::filesystem::path WebRoot(const ServerConfig& config) {
 }
 
 absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, StreamHub& hub) {
-  absl::StatusOr<std::unique_ptr<FrameSource>> source = OpenConfiguredSource(config);
-  if (!source.ok()) return source.status();
+  absl::StatusOr<OpenedSource> opened = OpenConfiguredSource(config);
+  if (!opened.ok()) return opened.status();
+  SourceInfo info = opened->source->info();
+  if (opened->mount && !opened->crop)
+    info.mount = std::make_shared<const MountModel>(opened->mount->model());
+  EngineOptions options;
+  if (opened->crop) {  // nothing to wear out, and no blur: quick, unless the file says otherwise
+    options.gaze.rate_deg_s = 120.0;
+    options.gaze.acceleration_deg_s2 = 2000.0;
+  }
   TrackerOptions tracker_options;
   tracker_options.seed = config.seed;
   if (!config.config_file.empty()) {
     const absl::Status loaded = tracker_options.LoadToml(config.config_file);
     if (!loaded.ok()) return loaded;
+    if (absl::Status gaze = options.gaze.LoadToml(config.config_file); !gaze.ok()) return gaze;
   }
-  absl::StatusOr<std::unique_ptr<FrameTracker>> tracker =
-      MakeSlamTracker((*source)->info(), tracker_options);
+  absl::StatusOr<std::unique_ptr<FrameTracker>> tracker = MakeSlamTracker(info, tracker_options);
   if (!tracker.ok()) return tracker.status();
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);
   if (!store.ok()) return store.status();
-  EngineOptions options;
   options.version = kVersion;
+  options.mount = opened->mount;
+  options.crop = opened->crop;
   options.every_frame = config.every_frame;
   options.video_bit_rate_bit_s = config.video_bit_rate_bit_s;
-  return Engine::Create(std::move(options), *std::move(source), *std::move(tracker),
+  return Engine::Create(std::move(options), std::move(opened->source), *std::move(tracker),
                         *std::move(store), hub);
 }
 

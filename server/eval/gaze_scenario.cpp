@@ -131,10 +131,9 @@ absl::Status Look(GazeRun& run, const GazeTarget& target, const Eigen::Vector3d&
                   bool fast, double for_s, GazeResult& result) {
   ++result.asked;
   const double begin = run.time_s();
-  const Rigid3 camera = run.TrueCamera();
-  const Eigen::Vector3d to = (true_point - camera.translation).normalized();
-  const Eigen::Vector3d from = camera.rotation * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d normal = from.cross(to).normalized();
+  // Past the target, in the plane of the approach: from 5 deg before it until 1.5 s later.
+  std::optional<Eigen::Vector3d> normal;
+  double near_since = 0;
   const Eigen::Vector3d rest = ToVector(run.mount().TrueAngles(run.now_ns()));
   double arrival = for_s, within_since = -1, moved = -1;
   bool arrived = false;
@@ -156,8 +155,14 @@ absl::Status Look(GazeRun& run, const GazeTarget& target, const Eigen::Vector3d&
     const Rigid3 seen = run.TrueCamera();
     const Eigen::Vector3d line = (true_point - seen.translation).normalized();
     const Eigen::Vector3d axis = seen.rotation * Eigen::Vector3d::UnitZ();
-    result.overshoot_deg =
-        std::max(result.overshoot_deg, std::asin(line.cross(axis).dot(normal)) / kDegree);
+    if (!normal && error < 5.0) {
+      normal = axis.cross(line).normalized();
+      near_since = now;
+    }
+    if (normal && now - near_since < 1.5) {
+      result.overshoot_deg =
+          std::max(result.overshoot_deg, std::asin(line.cross(axis).dot(*normal)) / kDegree);
+    }
   });
   result.arrived += arrived ? 1 : 0;
   result.arrival_s.Add(arrival);

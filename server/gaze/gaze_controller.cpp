@@ -224,6 +224,11 @@ MountDemand GazeController::Step(Timestamp now_ns, const std::optional<EncoderRe
     demand.rates_rad_s(k) = axis.rate;
     demand.rate_limits_rad_s(k) = kCatchUp * LimitsOf(k).rate;
   }
+  report_.world_from_view.reset();
+  if (const std::optional<Rigid3> wearer = wearer_.At(now_ns + Ns(Horizon_s()))) {
+    report_.world_from_view =
+        wearer->rotation * model_.MountFromCamera(ToAngles(demand.angles_rad)).rotation;
+  }
   sent_.push_back({now_ns + Ns(model_.options().command_latency_s), demand.angles_rad});
   WatchFollowing(now_ns, encoder);
   Judge(now_ns, encoder);
@@ -256,6 +261,7 @@ void GazeController::WatchFollowing(Timestamp now_ns,
 
 void GazeController::Judge(Timestamp now_ns, const std::optional<EncoderReading>& encoder) {
   report_.error_rad.reset();
+  report_.guidance_rad.reset();
   if (!LooksAtTarget(report_.mode) || !target_ || !encoder) {
     report_.arrived = false;
     return;
@@ -270,7 +276,12 @@ void GazeController::Judge(Timestamp now_ns, const std::optional<EncoderReading>
     report_.arrived = false;
     return;
   }
-  report_.error_rad = model_.Miss(encoder->angles, wearer->Inverse() * *target_);
+  const Eigen::Vector3d point_in_mount = wearer->Inverse() * *target_;
+  report_.error_rad = model_.Miss(encoder->angles, point_in_mount);
+  if (!report_.reachable) {
+    const Eigen::Vector3d seen = model_.MountFromCamera(encoder->angles).Inverse() * point_in_mount;
+    report_.guidance_rad = std::atan2(seen.y(), seen.x());
+  }
   // Once there, it takes twice as much to be elsewhere: encoders and prediction are noisy.
   const double limit_deg = (report_.arrived ? 2.0 : 1.0) * options_.arrived_deg;
   if (*report_.error_rad > limit_deg * kDegree) {

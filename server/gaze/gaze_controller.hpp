@@ -29,6 +29,8 @@ struct GazeReport {
   std::optional<double> error_rad;  // by the newest encoders and the predicted wearer
   bool arrived = false, target_lost = false, reachable = true, fast = false;
   double miss_rad = 0;
+  std::optional<double> guidance_rad;  // see GazeSnapshot
+  std::optional<Eigen::Quaterniond> world_from_view;
   std::string problem;
 };
 

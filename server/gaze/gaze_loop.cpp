@@ -203,6 +203,8 @@ void GazeLoop::Publish(Timestamp now_ns) {
   snapshot->reachable = report.reachable;
   snapshot->miss_rad = report.miss_rad;
   snapshot->fast = report.fast;
+  snapshot->guidance_rad = report.guidance_rad;
+  snapshot->world_from_view = report.world_from_view;
   snapshot->problem = report.problem;
   snapshot->pilot = arbiter_.pilot();
   snapshot->queue = arbiter_.queue();

@@ -9,14 +9,21 @@ namespace {
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kReached_rad = 1e-6;
 constexpr int kRefinements = 12;
+constexpr double kUnwinding = 0.3;  // way that a radian off the middle is worth
 
-/// The turn of `angle` nearest to `near` within the joint's limits; else the nearer limit.
+/// Of the turns of `angle` within the joint's limits the nearest to `near`, those further from the
+/// middle handicapped: a head that always takes the shortest way winds itself up, and must unwind
+/// when it can least afford it. Without one within the limits, the nearer limit.
 double InLimits(double angle, double near, const JointOptions& joint) {
   std::optional<double> best;
+  double shortest = 0;
   for (int turn = -3; turn <= 3; ++turn) {
     const double candidate = angle + turn * kTwoPi;
     if (candidate < joint.min_rad - 1e-12 || candidate > joint.max_rad + 1e-12) continue;
-    if (!best || std::abs(candidate - near) < std::abs(*best - near)) best = candidate;
+    const double way = std::abs(candidate - near) + kUnwinding * std::abs(candidate);
+    if (best && way >= shortest) continue;
+    best = candidate;
+    shortest = way;
   }
   if (best) return *best;
   // The limit that is nearer round the circle.

@@ -171,8 +171,9 @@ const char* ToString(MountJoint joint) { return kNames[static_cast<int>(joint)];
 std::array<JointOptions, kMountJoints> MountOptions::DefaultJoints() {
   std::array<JointOptions, kMountJoints> joints;
   joints[0].axis = Eigen::Vector3d::UnitY();
-  joints[0].min_rad = -200 * kDegree;  // past the back on both sides: no blind wedge
-  joints[0].max_rad = 200 * kDegree;
+  // One turn each way: a target is held past the wearer's back while he turns round.
+  joints[0].min_rad = -360 * kDegree;
+  joints[0].max_rad = 360 * kDegree;
   joints[1].axis = Eigen::Vector3d::UnitX();
   joints[1].min_rad = -80 * kDegree;
   joints[1].max_rad = 80 * kDegree;

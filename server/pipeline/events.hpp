@@ -7,6 +7,7 @@
 
 #include "shared/camera/camera_model.hpp"
 #include "shared/scene/annotation.hpp"
+#include "shared/scene/gaze.hpp"
 #include "shared/scene/map_snapshot.hpp"
 #include "shared/time/timestamp.hpp"
 
@@ -54,13 +55,14 @@ struct EngineStatistics {
 };
 
 /// Who hears of what happens: the gRPC streams here, a message broker on another machine later.
-/// Calls come from the tracker and encode threads and must not block.
+/// Calls come from the tracker, gaze and encode threads and must not block.
 class EventSink {
  public:
   virtual ~EventSink() = default;
   virtual void OnTracked(const TrackedEvent& event) = 0;
   virtual void OnVideo(const std::shared_ptr<const VideoPacket>& packet) = 0;
   virtual void OnStatistics(const EngineStatistics& statistics) = 0;
+  virtual void OnGaze(const std::shared_ptr<const GazeSnapshot>& state) = 0;
   virtual void OnEndOfSource(std::uint64_t frames) = 0;
 };
 

@@ -10,6 +10,7 @@
 
 #include "server/pipeline/commands.hpp"
 #include "server/pipeline/events.hpp"
+#include "server/pipeline/gaze_commands.hpp"
 
 namespace saccade {
 
@@ -32,6 +33,13 @@ class Backend : public CommandPort {
   virtual const ServerFacts& facts() const = 0;
   /// All annotations with every edit that was answered, before the first frame too; never null.
   virtual std::shared_ptr<const AnnotationList> annotations() const = 0;
+  /// Never null; mode NO_MOUNT without a mount.
+  virtual std::shared_ptr<const GazeSnapshot> gaze() const = 0;
+  /// To the gaze thread. On error `done` is not called:
+  ///   FailedPrecondition  there is no mount
+  ///   ResourceExhausted   too many commands are waiting
+  ///   Unavailable         the server is shutting down
+  virtual absl::Status SubmitGaze(GazeCommand command) = 0;
   /// Encodes on another thread. `frame_id` absent: newest. Errors go to `done`:
   ///   NotFound           no longer, or not yet, in the ring
   ///   ResourceExhausted  too many stills are being made

@@ -1,15 +1,51 @@
 #pragma once
 
 #include "saccade/v1/gaze.grpc.pb.h"
+#include "server/rpc/backend.hpp"
+#include "server/rpc/session_table.hpp"
 
 namespace saccade {
 
-/// State only: this build steers no mount.
+/// Who steers, and where to: check, submit to the gaze thread, answer. Handlers run on gRPC's
+/// threads and never block.
 class GazeService final : public v1::GazeService::CallbackService {
+ public:
+  GazeService(Backend& backend, SessionTable& sessions) : backend_(backend), sessions_(sessions) {}
+
  private:
-  grpc::ServerUnaryReactor* GetState(grpc::CallbackServerContext* context,
-                                     const v1::GetGazeStateRequest* request,
-                                     v1::GetGazeStateResponse* response) override;
+  using Context = grpc::CallbackServerContext;
+  using Reactor = grpc::ServerUnaryReactor;
+
+  Reactor* GetState(Context* context, const v1::GetGazeStateRequest* request,
+                    v1::GetGazeStateResponse* response) override;
+  Reactor* AcquireLease(Context* context, const v1::AcquireLeaseRequest* request,
+                        v1::AcquireLeaseResponse* response) override;
+  Reactor* ReleaseLease(Context* context, const v1::ReleaseLeaseRequest* request,
+                        v1::ReleaseLeaseResponse* response) override;
+  Reactor* Fixate(Context* context, const v1::FixateRequest* request,
+                  v1::FixateResponse* response) override;
+  Reactor* StopFixating(Context* context, const v1::StopFixatingRequest* request,
+                        v1::StopFixatingResponse* response) override;
+  Reactor* Home(Context* context, const v1::HomeRequest* request,
+                v1::HomeResponse* response) override;
+  Reactor* KeepHorizon(Context* context, const v1::KeepHorizonRequest* request,
+                       v1::KeepHorizonResponse* response) override;
+  Reactor* Explore(Context* context, const v1::ExploreRequest* request,
+                   v1::ExploreResponse* response) override;
+  Reactor* Override(Context* context, const v1::OverrideRequest* request,
+                    v1::OverrideResponse* response) override;
+  Reactor* Pause(Context* context, const v1::PauseRequest* request,
+                 v1::PauseResponse* response) override;
+
+  absl::StatusOr<GazeCaller> CallerOf(const std::string& session_id);
+  template <typename Request, typename Response>
+  Reactor* Steer(Context* context, const Request* request, Response* response, const char* method,
+                 SteerGaze::What what);
+  void Submit(Reactor* reactor, const char* method, const std::string& session_id,
+              GazeCommand command);
+
+  Backend& backend_;
+  SessionTable& sessions_;
 };
 
 }  // namespace saccade

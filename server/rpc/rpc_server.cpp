@@ -45,7 +45,8 @@ class RpcServer::Impl {
             [&backend](const std::string& id) { return backend.Submit(ForgetSession{id}).ok(); }),
         session_service_(backend, hub, sessions_),
         annotation_service_(backend, hub, sessions_),
-        map_service_(backend, hub, sessions_) {}
+        map_service_(backend, hub, sessions_),
+        gaze_service_(backend, sessions_) {}
   ~Impl() { Stop(std::chrono::milliseconds(500)); }
 
   absl::Status Start(const RpcServerOptions& options) {

@@ -39,6 +39,10 @@ void StreamHub::OnStatistics(const EngineStatistics& statistics) {
   runner_.Post(statistics).IgnoreError();
 }
 
+void StreamHub::OnGaze(const std::shared_ptr<const GazeSnapshot>& state) {
+  runner_.Post(state).IgnoreError();
+}
+
 void StreamHub::OnEndOfSource(std::uint64_t frames) {
   {
     const std::lock_guard lock(mutex_);
@@ -57,6 +61,8 @@ void StreamHub::Distribute(const Message& message) {
         subscription.Offer(*packet);
       } else if (const auto* statistics = std::get_if<EngineStatistics>(&message)) {
         subscription.Offer(*statistics);
+      } else if (const auto* gaze = std::get_if<std::shared_ptr<const GazeSnapshot>>(&message)) {
+        subscription.OfferGaze(*gaze);
       } else if (const auto* end = std::get_if<EndOfSource>(&message)) {
         subscription.OfferEnd(end->frames);
       } else {
@@ -73,6 +79,7 @@ void StreamHub::Add(const std::shared_ptr<Subscriber>& subscriber) {
     const std::shared_ptr<const v1::PresenceEvent> present = presence();
     subscriber->Update([&](Subscription& subscription) {
       if (tracked) subscription.Offer(*tracked);
+      subscription.OfferGaze(backend_->gaze());
       if (end) subscription.OfferEnd(*end);
       subscription.OfferPresence(present);
     });

@@ -65,6 +65,7 @@ class StreamHub : public EventSink {
   void OnTracked(const TrackedEvent& event) override;
   void OnVideo(const std::shared_ptr<const VideoPacket>& packet) override;
   void OnStatistics(const EngineStatistics& statistics) override;
+  void OnGaze(const std::shared_ptr<const GazeSnapshot>& state) override;
   void OnEndOfSource(std::uint64_t frames) override;
 
   /// Opens a stream; one that the same session had is closed (Aborted).
@@ -88,7 +89,7 @@ class StreamHub : public EventSink {
     std::uint64_t frames;
   };
   using Message = std::variant<TrackedEvent, std::shared_ptr<const VideoPacket>, EngineStatistics,
-                               EndOfSource, PresenceChanged>;
+                               std::shared_ptr<const GazeSnapshot>, EndOfSource, PresenceChanged>;
 
   void Distribute(const Message& message);
   /// False: closed. `replaced` is the stream that the same session had.

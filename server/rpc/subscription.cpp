@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "shared/wire/gaze.hpp"
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade {
@@ -75,6 +76,12 @@ void Subscription::Offer(const std::shared_ptr<const VideoPacket>& packet) {
 
 void Subscription::Offer(const EngineStatistics& statistics) { statistics_ = statistics; }
 
+void Subscription::OfferGaze(std::shared_ptr<const GazeSnapshot> state) {
+  if (state == gaze_seen_) return;
+  gaze_seen_ = state;
+  gaze_ = std::move(state);
+}
+
 void Subscription::OfferPresence(std::shared_ptr<const v1::PresenceEvent> presence) {
   if (presence == presence_seen_) return;
   presence_seen_ = presence;
@@ -121,8 +128,8 @@ bool Subscription::Fill(Kind kind, Timestamp now_ns, v1::Event& event) {
       *event.mutable_presence() = *std::exchange(presence_, nullptr);
       return true;
     case kGaze:
-      if (!Has(v1::TOPIC_GAZE) || !std::exchange(gaze_due_, false)) return false;
-      event.mutable_gaze()->set_mode(v1::GAZE_MODE_NO_MOUNT);
+      if (!Has(v1::TOPIC_GAZE) || gaze_ == nullptr) return false;
+      *event.mutable_gaze() = wire::ToProto(*std::exchange(gaze_, nullptr));
       return true;
     case kPose:
       return FillPose(event);

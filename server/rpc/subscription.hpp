@@ -39,6 +39,7 @@ class Subscription {
   void Offer(const TrackedEvent& event);
   void Offer(const std::shared_ptr<const VideoPacket>& packet);
   void Offer(const EngineStatistics& statistics);
+  void OfferGaze(std::shared_ptr<const GazeSnapshot> state);
   void OfferPresence(std::shared_ptr<const v1::PresenceEvent> presence);
   void OfferEnd(std::uint64_t frames) {
     if (!std::exchange(end_seen_, true)) end_frames_ = frames;
@@ -75,7 +76,9 @@ class Subscription {
   std::optional<TrackedEvent> tracked_;  // the newest
   // Whether `tracked_` is yet to be looked at, by kind.
   bool pose_due_ = false, map_due_ = false, annotations_due_ = false;
-  bool gaze_due_ = true;
+  // No mount, until somebody says otherwise.
+  std::shared_ptr<const GazeSnapshot> gaze_ = std::make_shared<const GazeSnapshot>();
+  std::shared_ptr<const GazeSnapshot> gaze_seen_;
   MapDeltaTracker map_;
   AnnotationDeltaTracker annotations_;
   VideoQueue video_;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 #include <string>
 #include <variant>
@@ -63,10 +63,11 @@ struct GazeSnapshot {
   std::uint64_t handovers = 0;     // changes of hands so far
   std::string last_handover;       // in words, e.g. "Ann released; Bob pilots"
 
-  // Digital gaze and fixed cameras.
-  /// Where the wearer finds the target: angle in the picture from straight right, clockwise [rad];
-  /// absent: it is in view, or there is none.
+  /// Where the wearer finds a target that the joints cannot reach: angle in the picture from
+  /// straight right, clockwise [rad]; absent: it is reached, or there is none.
   std::optional<double> guidance_rad;
+  /// Orientation of the optic axis when the newest demand acts; digital gaze crops by it.
+  std::optional<Eigen::Quaterniond> world_from_view;
 };
 
 /// "no mount", "idle", "saccade" ...

@@ -172,6 +172,41 @@ TEST_F(CommandLine, GazeSaysThatThereIsNoMount) {
   ExpectFailure(Run({"home"}), "no mount");
 }
 
+TEST(CommandLineWithAHead, FixateTurnsTheHeadSaysSoAndHomeBringsItBack) {
+  TemporaryFolder folder;
+  Server server({"--source", "sim:desk?motion=still&width=320&height=240", "--mount", "sim",
+                 "--data-dir", folder / "data"});
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"--server", server.grpc(), "--name", "Ann"});
+    return Saccade(arguments, folder / "state");
+  };
+  // Until the tracker has a pose; a slow computer may need more than one try.
+  double farthest = 0;
+  std::string pilot;
+  for (int attempt = 0; attempt < 5 && farthest < 0.1; ++attempt) {
+    const RunResult result = run({"fixate", "--point", "1.0,0.2,0", "--for", "3", "--json"});
+    std::istringstream lines(result.out);
+    for (std::string line; std::getline(lines, line);) {
+      const json state = json::parse(line, nullptr, /*allow_exceptions=*/false);
+      ASSERT_TRUE(state.is_object()) << result.out << result.err;
+      if (state["joints_rad"].is_array()) {
+        farthest = std::max(farthest, state["joints_rad"][0].get<double>());
+      }
+      if (state["pilot"].is_string()) pilot = state["pilot"].get<std::string>();
+    }
+  }
+  EXPECT_GT(farthest, 0.1);
+  EXPECT_EQ(pilot, "Ann");
+  const RunResult home = run({"home"});
+  EXPECT_EQ(home.exit_code, 0) << home.err;
+  EXPECT_THAT(home.out, HasSubstr("home"));
+  ExpectFailure(run({"fixate", "--point", "0,0,700"}), "at most 30 m");
+  ExpectFailure(run({"release"}), "lease");
+  EXPECT_EQ(run({"fixate"}).exit_code, 2);
+  server.process().Signal(SIGTERM);
+  EXPECT_EQ(server.process().Wait(seconds(4)), 0) << server.process().err();
+}
+
 TEST_F(CommandLine, PortThatIsNotGrpcFailsClearly) {
   std::string http = server_->http();
   if (http.starts_with("http://")) http = http.substr(7);

@@ -60,8 +60,10 @@ class ScriptedTracker final : public FrameTracker {
     snapshot->status = TrackingStatus::kTracking;
     snapshot->quality = TrackingQuality::kGood;
     snapshot->metric = true;
+    if (frame.mount) snapshot->world_from_camera = MountModel().MountFromCamera(*frame.mount);
     snapshot->map_generation = generation_;
     snapshot->attempted = snapshot->matched = 20;
+    const Rigid3 camera_from_world = snapshot->world_from_camera.Inverse();
     for (int i = 0; i < 20; ++i) {
       FeatureSnapshot feature;
       feature.id = static_cast<FeatureId>(i + 1);
@@ -70,7 +72,7 @@ class ScriptedTracker final : public FrameTracker {
       feature.covariance_in_world = feature.covariance_in_camera =
           1e-6 * Eigen::Matrix3d::Identity();
       feature.depth_known = true;
-      feature.pixel = frame.camera->Project(feature.point_in_world);
+      feature.pixel = frame.camera->Project(camera_from_world * feature.point_in_world);
       feature.matched_count = 50;
       snapshot->features.push_back(feature);
     }
@@ -102,6 +104,7 @@ InProcessServer::InProcessServer(const InProcessOptions& options) {
   EngineOptions engine_options;
   engine_options.version = "test";
   engine_options.mailbox = options.mailbox;
+  engine_options.mount = options.mount;
   engine_ = Must(Engine::Create(engine_options, std::make_unique<MovingTexture>(options),
                                 std::make_unique<ScriptedTracker>(options.before_frame),
                                 std::move(store), hub_));

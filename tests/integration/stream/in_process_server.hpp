@@ -19,13 +19,14 @@ struct InProcessOptions {
   std::filesystem::path data_dir;  // empty: nothing is stored
   std::size_t mailbox = 64;
   std::size_t max_sessions = 1000;
+  std::shared_ptr<Mount> mount;  // null: none
   /// Runs on the tracker thread before each frame.
   std::function<void()> before_frame = [] {};
 };
 
 /// The server's engine, hub and gRPC server in this process, on a free port. The camera is a moving
 /// texture at 30 Hz; the tracker is scripted: 20 features in the plane z = 2 m, camera at the
-/// origin, always tracking.
+/// origin, turned by the mount if there is one, always tracking.
 class InProcessServer {
  public:
   explicit InProcessServer(const InProcessOptions& options = {});

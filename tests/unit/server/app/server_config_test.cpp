@@ -68,7 +68,12 @@ TEST(ServerConfig, BadUsageNamesTheFlagAndTheRemedy) {
   EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", "example.org:1"}), HasSubstr("IP address"));
   EXPECT_THAT(Error({"--source", "sim:desk", "--run-for", "-1"}), HasSubstr("--run-for"));
   EXPECT_THAT(Error({"--source", "sim:desk", "--run-for", "nan"}), HasSubstr("--run-for"));
-  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "dynamixel:/dev/x"}), HasSubstr("--mount"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "warp"}), HasSubstr("none or sim"));
+  EXPECT_EQ(Good({"--source", "dataset:/x", "--mount", "crop:320x240"}).mount, "crop:320x240");
+  EXPECT_THAT(Error({"--source", "dataset:/x", "--mount", "sim"}), HasSubstr("sim: source only"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "sim", "--speed", "max"}),
+              HasSubstr("--speed max"));
+  EXPECT_EQ(Good({"--source", "sim:desk", "--mount", "sim"}).mount, "sim");
   EXPECT_THAT(Error({"--source", "sim:desk", "--gl", "vulkan"}), HasSubstr("--gl"));
   EXPECT_THAT(Error({"--source", "dataset:/x", "--sim-truth", "t"}), HasSubstr("--sim-truth"));
 }

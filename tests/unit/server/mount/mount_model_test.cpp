@@ -106,6 +106,22 @@ TEST(MountModel, FixationBehindTheBackTakesTheNearerTurn) {
               -170 * kDegree, 1e-9);
 }
 
+TEST(MountModel, UnwindsWhereBothWaysAreAboutAsLong) {
+  const MountModel model;
+  const auto pan_from = [&](double now_deg, double target_deg) {
+    const double target = target_deg * kDegree;
+    return model
+               .Fixate({std::sin(target), 0, std::cos(target)}, std::nullopt,
+                       {now_deg * kDegree, 0, 0})
+               .angles.pan_rad /
+           kDegree;
+  };
+  EXPECT_NEAR(pan_from(200, 10), 10, 1e-6) << "not 370, which is out of reach, nor 170 further";
+  EXPECT_NEAR(pan_from(150, -45), -45, 1e-6) << "195 deg back rather than 165 deg on to 315";
+  EXPECT_NEAR(pan_from(150, -120), 240, 1e-6) << "90 deg on rather than 270 deg back";
+  EXPECT_NEAR(pan_from(240, -115), 245, 1e-6) << "what is held is held on";
+}
+
 TEST(MountModel, OutOfReachLooksAtTheNearestReachableDirection) {
   MountOptions options;
   options.of(MountJoint::kPan).min_rad = -60 * kDegree;
