@@ -314,10 +314,22 @@ async function cubeError({ expert, truth, camera }, { point }) {
   return length(minus(mean(found), mean(wanted)));
 }
 
+/** How many marks the page lists, once that number has stood for two seconds: edits may be on their way. */
+async function settledCount(expert) {
+  let count = -1;
+  for (let steady = 0, tries = 0; steady < 4 && tries < 40; ++tries) {
+    const now = (await expert.annotationIds()).length;
+    steady = now === count ? steady + 1 : 0;
+    count = now;
+    await sleep(500);
+  }
+  return count;
+}
+
 /** The server goes away and comes back: the page says so, and comes back by itself. */
 async function restart(context, start) {
   const { expert, check } = context;
-  const before = (await expert.annotationIds()).length;
+  const before = await settledCount(expert);
   context.truth.close();
   const stopMs = await context.server.stop();
   check('server stops on SIGTERM within 2 s', stopMs < 2000, `${stopMs.toFixed(0)} ms`);
@@ -335,7 +347,7 @@ async function restart(context, start) {
   );
   const pictureMs = performance.now() - begin;
   await expert.waitForStatus(/^tracking/, 60_000);
-  const after = (await expert.annotationIds()).length;
+  const after = await settledCount(expert);
   check(
     'reconnects by itself',
     liveMs < 5000,
