@@ -5,12 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace saccade {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kMaxStep_s = 0.05;
+// By how much a pose may differ from the expected one, at once and for each second since the last:
+// beyond any wearer's acceleration.
+constexpr double kJump_rad = 4 * kDegree, kJumpRate_rad_s = 20 * kDegree;
+constexpr double kJump_m = 0.10, kJumpRate_m_s = 0.5;
 constexpr double kCatchUp = 1.02;            // of the rate limit, for servos that lag behind
 constexpr Timestamp kRateSpan = 20'000'000;  // over which a moving goal's rate is taken
 
@@ -93,10 +98,29 @@ void GazeController::Idle() {
 }
 
 void GazeController::ObservePose(const PoseObservation& pose) {
-  wearer_.Add(pose.time_ns, pose.world_from_camera * model_.MountFromCamera(pose.angles).Inverse());
+  const std::optional<PoseObservation> before = std::exchange(last_pose_, pose);
+  if (before && pose.time_ns > before->time_ns) {
+    const double rate = (ToVector(pose.angles) - ToVector(before->angles)).cwiseAbs().maxCoeff() /
+                        Seconds(pose.time_ns - before->time_ns);
+    // In a fast saccade pictures are blurred; encoders and the wearer's inertia know better.
+    if (rate > options_.suspend_above_deg_s * kDegree) return;
+  }
+  const Rigid3 base = pose.world_from_camera * model_.MountFromCamera(pose.angles).Inverse();
+  if (Believable(pose.time_ns, base)) wearer_.Add(pose.time_ns, base);
+}
+
+bool GazeController::Believable(Timestamp time_ns, const Rigid3& world_from_mount) const {
+  const std::optional<Rigid3> expected = wearer_.At(time_ns);
+  if (!expected) return true;
+  const double gap_s = Seconds(time_ns - *wearer_.newest_ns());
+  if (gap_s > options_.insist_s) return true;
+  const double turned = RotationAngle(*expected, world_from_mount);
+  const double moved = (expected->translation - world_from_mount.translation).norm();
+  return turned < kJump_rad + kJumpRate_rad_s * gap_s && moved < kJump_m + kJumpRate_m_s * gap_s;
 }
 
 void GazeController::ForgetMap() {
+  last_pose_.reset();
   wearer_.Clear();
   if (LooksAtTarget(report_.mode)) {
     Idle();

@@ -58,7 +58,9 @@ class GazeController {
 
   /// Direction of gravity in world; nothing: unknown, the picture is not levelled.
   void SetDown(const std::optional<Eigen::Vector3d>& down_in_world) { down_ = down_in_world; }
-  /// A new pose of the tracker, only while it tracks.
+  /// A new pose of the tracker, only while it tracks. What no wearer can have done since the pose
+  /// before is not believed (a tracker that has lost its way in a fast saccade), for as long as
+  /// that was not long ago.
   void ObservePose(const PoseObservation& pose);
   /// The map was thrown away: poses and target mean nothing now.
   void ForgetMap();
@@ -78,6 +80,7 @@ class GazeController {
     Eigen::Vector3d angles, rates;
   };
   void SetMode(GazeMode mode);
+  bool Believable(Timestamp time_ns, const Rigid3& world_from_mount) const;
   double Horizon_s() const;
   std::optional<FixationAngles> AnglesFor(Timestamp time_ns, const MountAngles& near) const;
   std::optional<Goal> MovingGoal(Timestamp now_ns);
@@ -90,6 +93,7 @@ class GazeController {
   const MountModel model_;
   const GazeOptions options_;
   WearerPredictor wearer_;
+  std::optional<PoseObservation> last_pose_;
   std::optional<Eigen::Vector3d> down_, target_;
   std::array<AxisProfile, kMountJoints> axes_;
   Eigen::Vector3d horizon_hold_ = Eigen::Vector3d::Zero();

@@ -24,6 +24,8 @@ const Key kKeys[] = {
     {"servo_lag_s", &O::servo_lag_s, 0, 0.5},
     {"pose_window_s", &O::pose_window_s, 0.03, 1},
     {"pose_stale_s", &O::pose_stale_s, 0.05, 10},
+    {"insist_s", &O::insist_s, 0.05, 60},
+    {"suspend_above_deg_s", &O::suspend_above_deg_s, 1, 1e5},
     {"arrived_deg", &O::arrived_deg, 0.05, 20},
     {"arrived_s", &O::arrived_s, 0, 10},
     {"not_following_deg", &O::not_following_deg, 0.5, 90},

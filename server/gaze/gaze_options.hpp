@@ -19,8 +19,10 @@ struct GazeOptions {
   bool compensate_latency = true;
   /// From a command to the motion it causes, beyond the mount's own command_latency.
   double servo_lag_s = 0.0;
-  double pose_window_s = 0.25;  // over which the wearer's motion is fitted
-  double pose_stale_s = 0.5;    // without a tracked pose: the head rests
+  double pose_window_s = 0.25;        // over which the wearer's motion is fitted
+  double pose_stale_s = 0.5;          // without a believed pose: the head rests
+  double insist_s = 2.0;              // a pose that cannot be is believed if it stays for so long
+  double suspend_above_deg_s = 90.0;  // rate of the head above which poses are not used
 
   // Judgement.
   double arrived_deg = 1.0;  // error below this ...

@@ -74,6 +74,8 @@ class ClosedLoop {
     }
   }
 
+  /// From now on the published poses are turned by this: a tracker that has lost its way.
+  void SetPoseError(const Eigen::Quaterniond& error) { pose_error_ = error; }
   void SetTracking(bool tracking) { tracking_ = tracking; }
   void SetPoseDelay(Timestamp ns) { pose_delay_ns_ = ns; }
   double peak_rate_deg_s() const { return peak_rate_deg_s_; }
@@ -85,6 +87,7 @@ class ClosedLoop {
     map_.capture_time_ns = frame_ns;
     map_.world_from_camera =
         wearer_(Seconds(frame_ns)) * mount_.model().MountFromCamera(mount_.TrueAngles(frame_ns));
+    map_.world_from_camera.rotation = map_.world_from_camera.rotation * pose_error_;
     GazeView view;
     view.map = std::make_shared<const MapSnapshot>(map_);
     view.annotations = std::make_shared<const std::vector<Annotation>>(annotations_);
@@ -101,6 +104,7 @@ class ClosedLoop {
   std::vector<Annotation> annotations_;
   Timestamp now_ns_ = 0, next_frame_ns_ = 0, pose_delay_ns_ = 40 * kMs;
   bool tracking_ = true, have_last_ = false;
+  Eigen::Quaterniond pose_error_ = Eigen::Quaterniond::Identity();
   Eigen::Vector3d last_;
   double peak_rate_deg_s_ = 0;
 };

@@ -116,6 +116,23 @@ TEST(GazeFaults, LostTrackingRestsTheHeadAndGoesOnWhenItIsBack) {
   EXPECT_TRUE(world.state().arrived);
 }
 
+TEST(GazeFaults, AWrongPoseForAMomentDoesNotTurnTheHeadAway) {
+  ClosedLoop world(StandStill);
+  world.Run(0.5);
+  const Eigen::Vector3d target(0.4, 0, 1);
+  ASSERT_TRUE(world.loop().Fixate(GazePoint{target}, false).ok());
+  world.Run(2.0);
+  world.SetPoseError(ExpQuaternion({0, 40 * kDegree, 0}));
+  double worst = 0;
+  world.Run(0.3, [&] { worst = std::max(worst, world.TrueError_deg(target)); });
+  EXPECT_LT(worst, 2.0);
+  world.Run(6.0);  // but whoever insists is believed: the map may really have moved
+  EXPECT_GT(world.TrueError_deg(target), 30);
+  world.SetPoseError(Eigen::Quaterniond::Identity());
+  world.Run(6.0);
+  EXPECT_LT(world.TrueError_deg(target), 1.0);
+}
+
 TEST(GazeFaults, AResetMapForgetsTheTarget) {
   ClosedLoop world(StandStill);
   world.Run(0.5);
