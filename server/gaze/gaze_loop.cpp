@@ -8,8 +8,13 @@
 namespace saccade {
 namespace {
 
+constexpr double kSureOfRotation_rad = 0.02;  // 1 sigma, worst axis
+
+/// Not while coasting: that is the tracker's guess, and the wearer's own prediction knows the head.
 bool HasPose(const MapSnapshot& map) {
-  return map.status == TrackingStatus::kTracking || map.status == TrackingStatus::kCoasting;
+  return map.status == TrackingStatus::kTracking &&
+         map.pose_covariance.diagonal().tail<3>().maxCoeff() <
+             kSureOfRotation_rad * kSureOfRotation_rad;
 }
 
 }  // namespace
