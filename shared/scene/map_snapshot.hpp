@@ -57,8 +57,8 @@ struct MapSnapshot {
   Eigen::Vector3d velocity_in_world = Eigen::Vector3d::Zero();           // [m/s]
   Eigen::Vector3d angular_velocity_in_camera = Eigen::Vector3d::Zero();  // [rad/s]
   std::vector<FeatureSnapshot> features;
-  int attempted = 0;  // features searched for in this frame
-  int matched = 0;    // accepted by the filter
+  int attempted = 0;        // features searched for in this frame
+  int matched = 0;          // accepted by the filter
   double searched_px2 = 0;  // area of all ellipses searched in this frame; 0: not counted
   /// Rises whenever the map changed other than by a filter update: reset, relocalisation, loop.
   std::uint64_t map_revision = 0;
