@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "server/eval/gaze_result.hpp"
 #include "server/eval/gaze_run.hpp"
 
 namespace saccade {
@@ -20,98 +21,6 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kStart_s = 2.2;  // on the chessboard, and the first features
 constexpr double kArrived_deg = 1.0;
 constexpr double kArrived_s = 0.2;
-
-/// What one run adds to the report.
-struct GazeResult {
-  Sample squared_error_deg, squared_roll_deg;  // per control step
-  Sample arrival_s, command_to_motion_ms;
-  double overshoot_deg = 0;
-  int asked = 0, arrived = 0, refused_clicks = 0;
-  std::optional<double> drift_first_m, drift_last_m, orientation_end_deg, search_area_ratio;
-  int false_depth = 0, features = 0;
-  std::uint64_t frames = 0, lost_frames = 0, initialising_frames = 0;
-  Sample measured;
-  double peak_rate_deg_s = 0;
-
-  void Add(const GazeResult& other);
-};
-
-template <typename T>
-void TakeWorst(std::optional<T>& mine, const std::optional<T>& other) {
-  if (other) mine = mine ? std::max(*mine, *other) : *other;
-}
-
-void GazeResult::Add(const GazeResult& other) {
-  squared_error_deg.Add(other.squared_error_deg);
-  squared_roll_deg.Add(other.squared_roll_deg);
-  arrival_s.Add(other.arrival_s);
-  command_to_motion_ms.Add(other.command_to_motion_ms);
-  overshoot_deg = std::max(overshoot_deg, other.overshoot_deg);
-  asked += other.asked;
-  arrived += other.arrived;
-  refused_clicks += other.refused_clicks;
-  TakeWorst(drift_first_m, other.drift_first_m);
-  TakeWorst(drift_last_m, other.drift_last_m);
-  TakeWorst(orientation_end_deg, other.orientation_end_deg);
-  TakeWorst(search_area_ratio, other.search_area_ratio);
-  false_depth += other.false_depth;
-  features += other.features;
-  frames += other.frames;
-  lost_frames += other.lost_frames;
-  initialising_frames += other.initialising_frames;
-  measured.Add(other.measured);
-  peak_rate_deg_s = std::max(peak_rate_deg_s, other.peak_rate_deg_s);
-}
-
-Json RootMean(const Sample& squares) {
-  return squares.size() == 0 ? Json(nullptr) : Json(std::sqrt(squares.Mean()));
-}
-Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
-double Least(const Sample& sample) {
-  return sample.size() == 0 ? 0.0
-                            : *std::min_element(sample.values().begin(), sample.values().end());
-}
-
-Json Report(const SimArguments& arguments, const GazeResult& result) {
-  Json report;
-  report["scenario"] = arguments.scenario;
-  report["seed"] = arguments.seed;
-  report["duration_s"] = arguments.duration_s;
-  report["runs"] = arguments.runs;
-  report["frames"] = result.frames;
-  report["lost_frames"] = result.lost_frames;
-  report["initialising_frames"] = result.initialising_frames;
-  report["features_measured_min"] = Least(result.measured);
-  report["features_measured_p5"] = result.measured.Percentile(5);
-  report["gaze_error_rms_deg"] = RootMean(result.squared_error_deg);
-  report["arrival_s"] = nullptr;
-  if (result.arrival_s.size() > 0) {
-    report["arrival_s"] = {{"min", Least(result.arrival_s)},
-                           {"median", result.arrival_s.Percentile(50)},
-                           {"max", result.arrival_s.Max()}};
-  }
-  report["peak_rate_deg_s"] = result.peak_rate_deg_s;
-  report["overshoot_deg_max"] = result.asked > 0 ? Json(result.overshoot_deg) : Json(nullptr);
-  report["roll_rms_deg"] = RootMean(result.squared_roll_deg);
-  report["asked"] = result.asked;
-  report["arrived"] = result.arrived;
-  report["refused_clicks"] = result.refused_clicks;
-  report["search_area_ratio"] = OrNull(result.search_area_ratio);
-  report["ate_se3_drift_m"] = nullptr;
-  if (result.drift_first_m) {
-    report["ate_se3_drift_m"] = {{"first_minute", *result.drift_first_m},
-                                 {"last_minute", *result.drift_last_m}};
-  }
-  report["orientation_error_end_deg"] = OrNull(result.orientation_end_deg);
-  report["false_depth_features"] = result.false_depth;
-  report["features_total"] = result.features;
-  report["command_to_motion_ms"] = nullptr;
-  if (result.command_to_motion_ms.size() > 0) {
-    report["command_to_motion_ms"] = {{"p50", result.command_to_motion_ms.Percentile(50)},
-                                      {"p99", result.command_to_motion_ms.Percentile(99)}};
-  }
-  return report;
-}
 
 /// Clicks again, a frame later, until the click is taken or `until_s` has come.
 absl::StatusOr<GazeRun::Clicked> ClickUntil(GazeRun& run, double until_s,
@@ -443,10 +352,10 @@ absl::StatusOr<nlohmann::ordered_json> RunGazeScenario(const SimArguments& asked
     SimArguments each = arguments;
     each.runs = 1;
     each.seed = seed;
-    runs.push_back(Report(each, result));
+    runs.push_back(GazeReportOf(each, result));
     total.Add(result);
   }
-  Json report = Report(arguments, total);
+  Json report = GazeReportOf(arguments, total);
   report["per_run"] = std::move(runs);
   return report;
 }
