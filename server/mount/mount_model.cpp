@@ -9,7 +9,7 @@ namespace {
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kReached_rad = 1e-6;
 constexpr int kRefinements = 12;
-constexpr double kUnwinding = 0.3;  // way that a radian off the middle is worth
+constexpr double kUnwinding = 0.1;  // way that a radian off the middle is worth
 
 /// Of the turns of `angle` within the joint's limits the nearest to `near`, those further from the
 /// middle handicapped: a head that always takes the shortest way winds itself up, and must unwind
