@@ -17,7 +17,8 @@ enum class PointsMode {
   kKnownMap,  // every point is known: localisation only (T39)
   kSlamFej,   // the target's points are known, the others are mapped; first-estimates Jacobians
               // (T40)
-  kSlam,      // the same with Jacobians at the current estimates
+  kSlam,      // the same with Jacobians at the current estimates after the first updates, as the
+              // tracker runs
 };
 
 /// What one frame did to the filter, against the truth.

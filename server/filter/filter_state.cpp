@@ -77,8 +77,7 @@ void FilterState::Predict(double dt, const MotionNoise& noise) {
   const double step = dt / steps;
   for (int k = 0; k < steps; ++k) {
     const MotionJacobians jacobians = LineariseMotion(
-        camera_, options_.fej ? first_pose_.rotation : camera_.world_from_camera.rotation, step,
-        noise);
+        camera_, Fej() ? first_pose_.rotation : camera_.world_from_camera.rotation, step, noise);
     covariance_.TransformBlock(0, jacobians.f);
     covariance_.AddBlock(0, jacobians.q);
     camera_ = PropagateMotion(camera_, step);

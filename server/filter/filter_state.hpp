@@ -60,7 +60,10 @@ struct UpdateReport {
 };
 
 struct FilterOptions {
-  bool fej = false;  // Jacobians at first estimates (slam-spec 1); README: why not
+  /// Jacobians at first estimates (slam-spec 1): always, or for the first updates of a map, while
+  /// the present ones still jump. README: update.
+  bool fej = false;
+  int fej_updates = 60;
   PointForm form = PointForm::kBearingRange;
   /// Read-out time of a rolling shutter, first to last row [s], and how sure that is; sigma 0: as
   /// given, not estimated.
@@ -163,6 +166,7 @@ class FilterState {
   };
   struct Linearised;  // of all observations: update.cpp
 
+  bool Fej() const { return options_.fej || updates_ <= options_.fej_updates; }
   int FeatureDim() const { return options_.form == PointForm::kBearingRange ? 3 : 1; }
   const Feature* Find(FeatureId id) const;
   const Anchor& AnchorOf(const Feature& feature) const;

@@ -38,7 +38,7 @@ SmallMatrix Gather(const Covariance& p, int anchor, int point, int point_dim) {
 std::optional<PixelPrediction> FilterState::Linearise(const CameraModel& camera, const Rigid3& pose,
                                                       const Feature& feature) const {
   auto current = PredictAnchored(camera, pose, Point(feature, false));
-  if (!current || !options_.fej) return current;
+  if (!current || !Fej()) return current;
   const auto first = PredictAnchored(camera, pose, Point(feature, true));
   if (!first) return current;
   PixelPrediction mixed = *first;

@@ -77,7 +77,7 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
       at = PredictFixed(camera, linearisation, *observation.known_point);
     } else if (const Feature* feature = Find(observation.id)) {
       at = PredictAnchored(camera, linearisation, MovedPoint(*feature, step));
-      if (at && options_.fej) {
+      if (at && Fej()) {
         if (const auto first = PredictAnchored(camera, linearisation, Point(*feature, true))) {
           at->d_camera = first->d_camera;
           at->d_anchor = first->d_anchor;
@@ -88,7 +88,7 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
       rows.point = feature->offset;
       rows.point_dim = FeatureDim();
       if (at) {
-        if (!options_.fej) {
+        if (!Fej()) {
           at->d_anchor.rightCols<3>() *= RightJacobianSo3(step.segment<3>(rows.anchor + 3)).eval();
         }
         ahead = at->d_anchor * step.segment<6>(rows.anchor) +
@@ -307,7 +307,7 @@ void FilterState::CarryScale(const VectorXd& step) {
   w /= total;
   d.segment<3>(0) = step.segment<3>(0);
   d.segment<3>(6) = step.segment<3>(6);
-  if (!options_.fej) {
+  if (!Fej()) {
     for (const Anchor& anchor : anchors_) {
       d.segment<3>(anchor.offset) = step.segment<3>(anchor.offset);
     }

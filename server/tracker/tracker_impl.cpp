@@ -34,6 +34,7 @@ FilterOptions MakeFilterOptions(const TrackerOptions& options, const CameraModel
   filter.readout_sigma_s =
       filter.readout_s > 0.0 ? kSurely * filter.readout_s : options.readout_sigma_s;
   filter.fej = options.fej;
+  filter.fej_updates = options.fej_updates;
   filter.parallax_sigmas = options.parallax_sigmas;
   filter.carry_scale_after = options.carry_scale_after;
   filter.form = options.range_only ? PointForm::kRangeOnly : PointForm::kBearingRange;

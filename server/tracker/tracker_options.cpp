@@ -27,6 +27,7 @@ const Key kKeys[] = {
     {"acceleration_sigma_m_s2", &O::acceleration_sigma_m_s2, 1e-3, 1e3},
     {"angular_acceleration_sigma_rad_s2", &O::angular_acceleration_sigma_rad_s2, 1e-3, 1e3},
     {"fej", &O::fej, 0, 1},
+    {"fej_updates", &O::fej_updates, 0, 1e9},
     {"range_only", &O::range_only, 0, 1},
     {"pixel_sigma_px", &O::pixel_sigma_px, 0.01, 20},
     {"pixel_sigma_growth", &O::pixel_sigma_growth, 0, 10},

@@ -22,7 +22,8 @@ struct TrackerOptions {
   double angular_acceleration_sigma_rad_s2 = 6.0;
 
   // Filter.
-  bool fej = false;                 // Jacobians at first estimates (slam-spec 1)
+  bool fej = false;                 // Jacobians at first estimates (slam-spec 1) always...
+  int fej_updates = 60;             // ...or for so many updates of a map
   bool range_only = false;          // ESID: bearings frozen at birth; false: SID
   double pixel_sigma_px = 0.5;      // of a match at the picture's centre, lens and warp included
   double pixel_sigma_growth = 1.0;  // sigma (1 + growth d / d_max): lens models fit worse outside

@@ -120,6 +120,7 @@ TEST(QuaternionReference, ErrorStateGivesTheSamePoseT2) {
   const Matrix12d prior = sigma.cwiseAbs2().asDiagonal();
   FilterOptions options;
   options.fej = false;
+  options.fej_updates = 0;
   FilterState filter(options);
   filter.Reset(CameraMotion(), prior);
   QuaternionFilter reference(prior);
