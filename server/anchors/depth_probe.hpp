@@ -18,7 +18,7 @@ struct ProbedDepth {
 /// the last seconds, seen from beside (plane sweep, Collins 1996; facing the camera).
 ///
 /// Nothing if the patch has no texture, the camera did not move sideways, or no single range stands
-/// out. Uses the poses that the tracker published with each frame. About 3 ms; any thread.
+/// out. Uses the poses that the tracker published with each frame. Any thread.
 std::optional<ProbedDepth> ProbeDepth(const PastFrame& clicked, const Eigen::Vector2d& pixel,
                                       double guess_m, FrameId newest, const FrameLookup& frames);
 
