@@ -1,57 +1,15 @@
 #include <benchmark/benchmark.h>
 
-#include <opencv2/imgproc.hpp>
-
 #include "server/features/corner_detector.hpp"
 #include "server/features/image_pyramid.hpp"
 #include "server/features/patch.hpp"
 #include "server/features/search.hpp"
+#include "tests/bench/textured_scene.hpp"
 
 namespace saccade {
 namespace {
 
-/// Scene: smoothed noise of two grain sizes at 640 x 480, seen through a Brown-Conrady lens.
-/// Corners everywhere, so detection and search have the most to do.
-struct Scene {
-  cv::Mat image;
-  ImagePyramid pyramid;
-  std::shared_ptr<const CameraModel> camera;
-  std::vector<Corner> corners;
-  std::vector<PatchTemplate> patches;
-
-  Scene() {
-    cv::setNumThreads(1);
-    cv::Mat fine(480, 640, CV_32FC1), rough(480, 640, CV_32FC1);
-    cv::RNG random(1);
-    random.fill(fine, cv::RNG::NORMAL, 0, 160);
-    random.fill(rough, cv::RNG::NORMAL, 0, 900);
-    cv::GaussianBlur(fine, fine, cv::Size(0, 0), 1.5);
-    cv::GaussianBlur(rough, rough, cv::Size(0, 0), 6.0);
-    cv::Mat sum = fine + rough + 128;
-    sum.convertTo(image, CV_8UC1);
-    CameraIntrinsics k;
-    k.model = LensModel::kBrownConrady;
-    k.width = 640;
-    k.height = 480;
-    k.fx = 517.3;
-    k.fy = 516.5;
-    k.cx = 318.6;
-    k.cy = 255.3;
-    k.distortion = {0.2624, -0.9531, -0.0054, 0.0026, 1.1633};
-    camera = std::make_shared<CameraModel>(k);
-    if (!pyramid.Build(image).ok()) std::abort();
-    CornerDetector detector({.min_score = 1000, .border_px = 40});
-    detector.DetectAll(pyramid, {}, 100, corners);
-    for (const Corner& corner : corners) {
-      patches.push_back(*CutPatch(image, corner.pixel, camera));
-    }
-  }
-};
-
-const Scene& TheScene() {
-  static const Scene scene;
-  return scene;
-}
+using Scene = TexturedScene;
 
 void BM_ImagePyramid(benchmark::State& state) {
   const Scene& scene = TheScene();
