@@ -2,8 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <toml.hpp>
 #include <variant>
+
+#include "server/mount/toml_table.hpp"
 
 namespace saccade {
 namespace {
@@ -47,27 +48,14 @@ absl::Status CheckKey(const GazeOptions& options, const Key& key) {
       "gaze.", key.name, ": ", value, "; give a number from ", key.least, " to ", key.most));
 }
 
-absl::Status SetKey(const std::string& name, const toml::value& value, GazeOptions& options) {
+void ReadGaze(TomlTable& table, GazeOptions& options) {
   for (const Key& key : kKeys) {
-    if (name != key.name) continue;
     if (const auto* number = std::get_if<double O::*>(&key.field)) {
-      if (value.is_floating()) {
-        options.*(*number) = value.as_floating();
-      } else if (value.is_integer()) {
-        options.*(*number) = static_cast<double>(value.as_integer());
-      } else {
-        return absl::InvalidArgumentError(absl::StrCat("gaze.", name, ": is not a number"));
-      }
-    } else if (value.is_boolean()) {
-      options.*std::get<bool O::*>(key.field) = value.as_boolean();
+      table.Number(key.name, 1.0, options.*(*number));
     } else {
-      return absl::InvalidArgumentError(absl::StrCat("gaze.", name, ": give true or false"));
+      table.Boolean(key.name, options.*std::get<bool O::*>(key.field));
     }
-    return absl::OkStatus();
   }
-  std::string known;
-  for (const Key& key : kKeys) absl::StrAppend(&known, known.empty() ? "" : ", ", key.name);
-  return absl::InvalidArgumentError(absl::StrCat("gaze.", name, ": unknown key; known: ", known));
 }
 
 }  // namespace
@@ -80,31 +68,7 @@ absl::Status GazeOptions::Validate() const {
 }
 
 absl::Status GazeOptions::LoadToml(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) {
-    return absl::NotFoundError(absl::StrCat(file.string(), ": no such file; give one that exists"));
-  }
-  GazeOptions read = *this;
-  try {
-    const toml::value root = toml::parse(file.string());
-    if (!root.contains("gaze")) return absl::OkStatus();
-    absl::Status status = root.at("gaze").is_table()
-                              ? absl::OkStatus()
-                              : absl::InvalidArgumentError("gaze: is not a table");
-    if (status.ok()) {
-      for (const auto& [name, value] : root.at("gaze").as_table()) {
-        if (status = SetKey(name, value, read); !status.ok()) break;
-      }
-    }
-    if (status.ok()) status = read.Validate();
-    if (!status.ok()) {
-      return absl::Status(status.code(), absl::StrCat(file.string(), ": ", status.message()));
-    }
-  } catch (const std::exception& problem) {
-    return absl::InvalidArgumentError(absl::StrCat(file.string(), ": ", problem.what()));
-  }
-  *this = read;
-  return absl::OkStatus();
+  return LoadTomlTable(file, "gaze", ReadGaze, *this);
 }
 
 }  // namespace saccade

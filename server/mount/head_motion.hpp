@@ -11,7 +11,10 @@ namespace saccade {
 class HeadMotion {
  public:
   virtual ~HeadMotion() = default;
+  /// What everybody believes of it.
   virtual const MountModel& model() const = 0;
+  /// What it really is: differs where somebody has to find out (calibrate-mount).
+  virtual const MountModel& true_model() const { return model(); }
   /// The head has moved up to `time_ns` when this returns.
   virtual void AdvanceTo(Timestamp time_ns) = 0;
   /// Where it really was.

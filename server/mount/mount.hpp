@@ -35,6 +35,8 @@ enum class MountHealth {
 struct MountStatus {
   MountHealth health = MountHealth::kReady;
   std::string problem;  // in words, with the joint and the remedy; empty when ready
+  /// Stands still under torque: nothing was demanded since it came up, or since Stop.
+  bool held = false;
 };
 
 /// A mount as gaze control sees it. Thread safe. Drivers do their input and output on a thread of

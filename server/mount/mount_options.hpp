@@ -24,6 +24,9 @@ struct JointOptions {
   double max_acceleration_rad_s2 = 60.0;  // the motor's own
   int encoder_sign = 1;                   // of raw angles against ours: +1 or -1
   double encoder_zero_rad = 0;            // raw angle at our zero
+
+  double ToRaw(double angle_rad) const { return encoder_sign * angle_rad + encoder_zero_rad; }
+  double FromRaw(double raw_rad) const { return encoder_sign * (raw_rad - encoder_zero_rad); }
 };
 
 /// Geometry and abilities of a pan/elevation/cyclotorsion mount (slam-spec section 8).
@@ -33,6 +36,8 @@ struct MountOptions {
                                                 MountJoint::kCyclotorsion};
   std::array<JointOptions, kMountJoints> joints = DefaultJoints();  // by MountJoint
   double encoder_sigma_rad = 0.1 * std::numbers::pi / 180.0;        // of one reading
+  /// By how much the encoders' time stamps are late against the pictures': drivers take it off.
+  double encoder_delay_s = 0.0;
   double command_latency_s = 0.02;  // from Send to the first motion; calibrate-mount measures it
 
   const JointOptions& of(MountJoint joint) const { return joints[static_cast<std::size_t>(joint)]; }

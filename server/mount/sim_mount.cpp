@@ -20,7 +20,11 @@ constexpr int kNotFollowing_ms = 300;
 }  // namespace
 
 SimMount::SimMount(const SimMountOptions& options)
-    : options_(options), model_(options.mount), rng_(options.seed) {}
+    : options_(options),
+      head_(options.truth.value_or(options.mount)),
+      model_(options.mount),
+      true_model_(head_),
+      rng_(options.seed) {}
 
 void SimMount::Sync() const {
   if (options_.wall_clock) const_cast<SimMount*>(this)->Advance(MonotonicNow());
@@ -58,7 +62,7 @@ void SimMount::Step() {
     if (unplugged_) continue;
     if (active_.brake) {
       // Full deceleration, and hold: the reference is where it would come to rest.
-      const double a = options_.mount.joints[static_cast<std::size_t>(k)].max_acceleration_rad_s2;
+      const double a = head_.joints[static_cast<std::size_t>(k)].max_acceleration_rad_s2;
       if (joint.stuck) continue;
       joint.rate -= std::clamp(joint.rate, -a * kStep_s, a * kStep_s);
       joint.angle += joint.rate * kStep_s;
@@ -73,7 +77,7 @@ void SimMount::Step() {
 
 void SimMount::StepJoint(int index, double reference, double rate) {
   Joint& joint = joints_[static_cast<std::size_t>(index)];
-  const JointOptions& limits = options_.mount.joints[static_cast<std::size_t>(index)];
+  const JointOptions& limits = head_.joints[static_cast<std::size_t>(index)];
   const double error = std::clamp(reference, limits.min_rad, limits.max_rad) - joint.angle;
   joint.behind_ms =
       std::abs(error) > kNotFollowing_rad && std::abs(joint.rate) < 1e-3 ? joint.behind_ms + 1 : 0;
@@ -95,8 +99,13 @@ void SimMount::ReadEncoders() {
   next_reading_ns_ += static_cast<Timestamp>(std::llround(1e9 / options_.encoder_hz));
   if (unplugged_) return;
   Eigen::Vector3d read = history_.back();
-  for (double& angle : read) angle += options_.mount.encoder_sigma_rad * normal_(rng_);
-  encoders_.Add({*now_ns_, ToAngles(read)});
+  for (int k = 0; k < kMountJoints; ++k) {
+    const auto joint = static_cast<MountJoint>(k);
+    read(k) += head_.encoder_sigma_rad * normal_(rng_);
+    read(k) = options_.mount.of(joint).FromRaw(head_.of(joint).ToRaw(read(k)));
+  }
+  const double late_s = head_.encoder_delay_s - options_.mount.encoder_delay_s;
+  encoders_.Add({*now_ns_ + static_cast<Timestamp>(std::llround(1e9 * late_s)), ToAngles(read)});
 }
 
 absl::Status SimMount::Send(const MountDemand& demand) {
@@ -107,11 +116,17 @@ absl::Status SimMount::Send(const MountDemand& demand) {
   const std::lock_guard lock(mutex_);
   Sync();
   if (unplugged_) return absl::UnavailableError("mount sim: disconnected: plug it in again");
-  Pending pending{.effect_ns = now_ns_.value_or(0) + static_cast<Timestamp>(std::llround(
-                                                         1e9 * options_.mount.command_latency_s)),
+  Pending pending{.effect_ns = now_ns_.value_or(0) +
+                               static_cast<Timestamp>(std::llround(1e9 * head_.command_latency_s)),
                   .demand = demand,
                   .brake = false};
   pending.demand.angles_rad = ToVector(model_.Clamp(ToAngles(demand.angles_rad)));
+  for (int k = 0; k < kMountJoints; ++k) {
+    const JointOptions& told = options_.mount.of(static_cast<MountJoint>(k));
+    const JointOptions& real = head_.of(static_cast<MountJoint>(k));
+    pending.demand.angles_rad(k) = real.FromRaw(told.ToRaw(pending.demand.angles_rad(k)));
+    pending.demand.rates_rad_s(k) *= told.encoder_sign * real.encoder_sign;
+  }
   pending_.push_back(pending);
   return absl::OkStatus();
 }
@@ -146,7 +161,7 @@ MountStatus SimMount::status() const {
     return {MountHealth::kFault, absl::StrCat("mount sim: ", ToString(static_cast<MountJoint>(k)),
                                               " does not follow: free the joint")};
   }
-  return {};
+  return {MountHealth::kReady, "", active_.brake};
 }
 
 MountAngles SimMount::TrueAngles(Timestamp time_ns) const {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <random>
 
 #include "server/mount/encoder_ring.hpp"
@@ -13,7 +14,11 @@
 namespace saccade {
 
 struct SimMountOptions {
-  MountOptions mount;
+  MountOptions mount;  // what gaze is told of the head
+  /// What the head really is; absent: what is told. Its axes, offsets, limits, noise and latency
+  /// are the head's; where encoder signs, zeros and delays differ, readings and demands are off by
+  /// that.
+  std::optional<MountOptions> truth;
   std::uint64_t seed = 1;          // of the encoders' noise
   double encoder_hz = 100.0;       // readings per second
   double servo_gain_per_s = 25.0;  // rate per error that the servos add to the demanded rate
@@ -28,6 +33,7 @@ class SimMount final : public Mount, public HeadMotion {
   explicit SimMount(const SimMountOptions& options);
 
   const MountModel& model() const override { return model_; }
+  const MountModel& true_model() const override { return true_model_; }
   absl::Status Send(const MountDemand& demand) override;
   void Stop() override;
   std::optional<EncoderReading> Newest() const override;
@@ -68,7 +74,8 @@ class SimMount final : public Mount, public HeadMotion {
   void ReadEncoders();
 
   const SimMountOptions options_;
-  const MountModel model_;
+  const MountOptions head_;
+  const MountModel model_, true_model_;
   mutable std::mutex mutex_;
   std::optional<Timestamp> now_ns_;
   std::array<Joint, kMountJoints> joints_;
