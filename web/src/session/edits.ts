@@ -10,6 +10,7 @@ import type { Annotation, Shape, Target } from './types';
 export interface Placement {
   readonly shape: Shape;
   readonly text: string;
+  readonly colorRgba: number;
   readonly target: Target;
   /** Takes its place where the server no longer keeps the frame that `target` names. */
   readonly later?: Target | undefined;
@@ -35,11 +36,12 @@ export class Edits {
       text: placement.text,
       pointInWorld: placement.guessInWorld,
       sizeM: 0.05,
+      colorRgba: placement.colorRgba,
     });
     try {
       const ask = (target: Target) => {
-        const { shape, text } = placement;
-        const fields = { shape: pbShapes[shape], text, target: toTarget(target) };
+        const { shape, text, colorRgba } = placement;
+        const fields = { shape: pbShapes[shape], text, colorRgba, target: toTarget(target) };
         const draft = create(AnnotationDraftSchema, fields);
         return clients.annotations.create({ requestId, sessionId, draft }, TIMEOUT);
       };
@@ -58,10 +60,18 @@ export class Edits {
     }
   }
 
-  async setText(id: string, text: string): Promise<void> {
+  setText(id: string, text: string): Promise<void> {
+    return this.update(id, { text });
+  }
+
+  setColour(id: string, colorRgba: number): Promise<void> {
+    return this.update(id, { colorRgba });
+  }
+
+  private async update(id: string, what: { text?: string; colorRgba?: number }): Promise<void> {
     const { annotations, clients, sessionId } = this.session;
     try {
-      const reply = await clients.annotations.update({ sessionId, id, text }, TIMEOUT);
+      const reply = await clients.annotations.update({ sessionId, id, ...what }, TIMEOUT);
       if (reply.annotation) annotations.put(toAnnotation(reply.annotation));
     } catch (error) {
       throw asEditError(error);

@@ -9,6 +9,8 @@ import { Acknowledger } from './acknowledger';
 import { AnnotationBook } from './annotation_book';
 import { ClockOffset, pageNowMs, wireTimes } from './clock';
 import { pbRoles, toIntrinsics, toParticipant, toPose, toStages } from './convert';
+import type { Gaze } from './gaze';
+import { toGaze } from './gaze_convert';
 import { MapState } from './map_state';
 import { FrameRing } from './ring';
 import {
@@ -51,6 +53,7 @@ export class Session {
   sourceEnded = false;
   participants: readonly Participant[] = [];
   statistics: Statistics | undefined;
+  gaze: Gaze | undefined;
   readonly map = new MapState();
   readonly annotations = new AnnotationBook();
   readonly frames = new FrameRing<FrameFacts>(300);
@@ -172,6 +175,7 @@ export class Session {
     this.joined = joined;
     this.lastEventMs = pageNowMs();
     this.sourceEnded = false;
+    this.gaze = undefined;
     this.frames.clear();
     this.path.length = 0;
     this.clock.reset();
@@ -246,6 +250,8 @@ export class Session {
         this.sourceEnded = true;
         break;
       case 'gaze':
+        this.gaze = toGaze(event.value);
+        break;
       case undefined:
         break;
     }

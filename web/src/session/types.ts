@@ -91,6 +91,7 @@ export interface PendingAnnotation {
   readonly text: string;
   readonly pointInWorld: Vec3 | undefined; // our own estimate until the server's
   readonly sizeM: number;
+  readonly colorRgba: number;
 }
 
 export interface Participant {

@@ -1,6 +1,6 @@
 import type { Shape } from '../session/types';
 
-export type ToolName = 'select' | 'cube' | 'note' | 'arrow';
+export type ToolName = 'select' | 'cube' | 'note' | 'arrow' | 'gaze';
 export type CommandName =
   | 'undo'
   | 'redo'
@@ -10,6 +10,8 @@ export type CommandName =
   | 'follow'
   | 'frame'
   | 'reset';
+/** What the head does at once, or who steers it. */
+export type HeadCommandName = 'stop' | 'home' | 'level' | 'explore' | 'fast' | 'lease';
 
 export interface Control<Name extends string> {
   readonly name: Name;
@@ -25,6 +27,13 @@ export const TOOLS: readonly Control<ToolName>[] = [
   { name: 'cube', label: 'Cube', key: 'c', shown: 'C', hint: 'click to place a 5 cm cube' },
   { name: 'note', label: 'Note', key: 'n', shown: 'N', hint: 'click to place a note, then type' },
   { name: 'arrow', label: 'Arrow', key: 'a', shown: 'A', hint: 'click to place an arrow' },
+  {
+    name: 'gaze',
+    label: 'Look',
+    key: 'g',
+    shown: 'G',
+    hint: 'click what the camera should look at and hold',
+  },
 ];
 
 /** What happens at once. */
@@ -63,8 +72,36 @@ export const COMMANDS: readonly Control<CommandName>[] = [
   },
 ];
 
+/** What happens to the head, on the gaze panel. */
+export const HEAD_COMMANDS: readonly Control<HeadCommandName>[] = [
+  { name: 'stop', label: 'Stop', key: 'x', shown: 'X', hint: 'stop the head where it is' },
+  { name: 'home', label: 'Ahead', key: '0', shown: '0', hint: 'look straight ahead (home)' },
+  {
+    name: 'level',
+    label: 'Level',
+    key: 'l',
+    shown: 'L',
+    hint: 'keep the direction, and the picture level',
+  },
+  {
+    name: 'explore',
+    label: 'Explore',
+    key: 'e',
+    shown: 'E',
+    hint: 'look round where the map is least certain',
+  },
+  { name: 'fast', label: 'Fast', key: 't', shown: 'T', hint: 'turn as fast as the head can' },
+  {
+    name: 'lease',
+    label: 'Pilot',
+    key: 'q',
+    shown: 'Q',
+    hint: 'take the lease of the head, wait for it, or release it',
+  },
+];
+
 export const shapeOf = (tool: ToolName): Shape | undefined =>
-  tool === 'select' ? undefined : tool;
+  tool === 'select' || tool === 'gaze' ? undefined : tool;
 
 /** The tool or command of a key press; nothing while typing or with Ctrl, Alt, Meta. */
 export function controlOf(event: {
@@ -73,7 +110,7 @@ export function controlOf(event: {
   readonly altKey: boolean;
   readonly metaKey: boolean;
   readonly shiftKey: boolean;
-}): ToolName | CommandName | undefined {
+}): ToolName | CommandName | HeadCommandName | undefined {
   const key = event.key.toLowerCase();
   if (event.altKey) return undefined;
   if (event.ctrlKey || event.metaKey) {
@@ -81,5 +118,5 @@ export function controlOf(event: {
     return key === 'y' ? 'redo' : undefined;
   }
   if (key === 'backspace') return 'delete';
-  return [...TOOLS, ...COMMANDS].find((control) => control.key === key)?.name;
+  return [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS].find((control) => control.key === key)?.name;
 }

@@ -1,6 +1,7 @@
 import { type Client, createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { AnnotationService } from '../gen/saccade/v1/annotation_pb';
+import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
 
@@ -8,6 +9,7 @@ export interface Clients {
   readonly session: Client<typeof SessionService>;
   readonly annotations: Client<typeof AnnotationService>;
   readonly map: Client<typeof MapService>;
+  readonly gaze: Client<typeof GazeService>;
 }
 
 /** gRPC-Web to the server that this page came from. */
@@ -17,5 +19,6 @@ export function createClients(baseUrl: string): Clients {
     session: createClient(SessionService, transport),
     annotations: createClient(AnnotationService, transport),
     map: createClient(MapService, transport),
+    gaze: createClient(GazeService, transport),
   };
 }

@@ -16,6 +16,10 @@ export function describeError(error: unknown): string {
   }
 }
 
+/** The same without the name of the request's field, which means nothing on a page. */
+export const plainWords = (error: unknown): string =>
+  describeError(error).replace(/^[a-z][a-z_]*(\.[a-z_]+)*: /, '');
+
 /** True where trying again cannot help: the request itself was refused. */
 export function isRefusal(error: unknown): boolean {
   const { code } = ConnectError.from(error);

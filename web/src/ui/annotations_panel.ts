@@ -4,6 +4,7 @@ import type { Session } from '../session/session';
 import type { AppState } from './app_state';
 import { h, icon, setClass, setText } from './dom';
 import { ICONS } from './icons';
+import { Palette } from './palette';
 import { anchorWords } from './words';
 
 export interface AnnotationActions {
@@ -11,6 +12,10 @@ export interface AnnotationActions {
   /** Shows which mark a row means; undefined: none. */
   point(id: string | undefined): void;
   remove(id: string): void;
+  /** Turns the camera to it. */
+  lookAt(id: string): void;
+  /** The colour of new marks, and of the selected one: 0xRRGGBBAA. */
+  paint(colorRgba: number): void;
   /** Empty `text` keeps the note as it is. */
   finishEditing(id: string, text: string | undefined): void;
   startEditing(id: string): void;
@@ -36,16 +41,19 @@ export class AnnotationsPanel {
     'None yet. Choose a cube (C), note (N) or arrow (A), then click in the map or the video.',
   );
   private readonly rows = new Map<string, Row>();
+  private readonly palette: Palette;
 
   constructor(
     private readonly session: Session,
     private readonly state: AppState,
     private readonly actions: AnnotationActions,
   ) {
+    this.palette = new Palette((colour) => actions.paint(colour));
     this.element = h(
       'aside',
       { 'aria-label': 'Annotations' },
       h('h2', {}, 'Annotations', this.count),
+      this.palette.element,
       this.empty,
       this.list,
     );
@@ -54,6 +62,7 @@ export class AnnotationsPanel {
   update(): void {
     const annotations = this.session.annotations.list();
     setText(this.count, String(annotations.length));
+    this.palette.update(this.state.colorRgba);
     setClass(this.empty, 'hidden', annotations.length > 0);
     const present = new Set(annotations.map(({ id }) => id));
     for (const [id, row] of this.rows) {
@@ -100,7 +109,11 @@ export class AnnotationsPanel {
     remove.setAttribute('aria-label', `Delete ${shape}`);
     remove.append(icon('M5.5 5.5l9 9M14.5 5.5l-9 9'));
     remove.addEventListener('click', () => this.actions.remove(id));
-    const element = h('li', { 'data-id': id, 'data-shape': shape }, button, remove);
+    const look = h('button', { class: 'look', type: 'button', title: 'Turn the camera to it' });
+    look.setAttribute('aria-label', `Turn the camera to this ${shape}`);
+    look.append(icon(ICONS.gaze));
+    look.addEventListener('click', () => this.actions.lookAt(id));
+    const element = h('li', { 'data-id': id, 'data-shape': shape }, button, look, remove);
     element.addEventListener('pointerenter', () => this.actions.point(id));
     element.addEventListener('pointerleave', () => this.actions.point(undefined));
     this.list.append(element);

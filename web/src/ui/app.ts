@@ -1,10 +1,16 @@
 import { Edits } from '../session/edits';
+import { gazeKey, hasHead } from '../session/gaze';
+import { GazePilot } from '../session/gaze_pilot';
 import { LatencyMeter, RateMeter, stageTimes } from '../session/latency';
 import type { Session } from '../session/session';
+import { keepLeaseAt } from '../transport/lease_keeper';
 import { AnnotationsPanel } from './annotations_panel';
 import { AppState } from './app_state';
 import { Controller } from './controller';
-import { h } from './dom';
+import { h, setClass } from './dom';
+import { GazeController } from './gaze_controller';
+import { GazePanel } from './gaze_panel';
+import { HandoverNotice } from './handover_notice';
 import { Header } from './header';
 import { Help } from './help';
 import { handleKeys } from './keys';
@@ -31,6 +37,9 @@ export class App {
   private readonly video: VideoPane;
   private readonly tools: ToolsColumn;
   private readonly annotations: AnnotationsPanel;
+  private readonly pilot: GazePilot;
+  private readonly gaze: GazePanel;
+  private readonly notice: HandoverNotice;
   private readonly stage = h('main', {});
   private mapLoading = false;
   private panelsMs = 0;
@@ -43,25 +52,31 @@ export class App {
     const { state } = this;
     this.map = new MapPane(session, player, state);
     this.video = new VideoPane(session, player, state);
-    const controller = new Controller(session, new Edits(session), state, this.map, this.video);
+    this.pilot = new GazePilot(session, keepLeaseAt(location.origin));
+    const gaze = new GazeController(session, this.pilot, state);
+    const edits = new Edits(session);
+    const controller = new Controller(session, edits, state, this.map, this.video, gaze);
     this.tools = new ToolsColumn(controller);
     this.annotations = new AnnotationsPanel(session, state, controller);
-    this.stage.append(this.map.element, this.video.element);
+    this.gaze = new GazePanel(session, this.pilot, state, gaze);
+    this.notice = new HandoverNotice(session);
+    this.stage.append(this.map.element, this.video.element, this.notice.element);
     this.element = h('div', { class: 'app' });
     this.element.append(
       this.header.element,
       this.tools.element,
       this.stage,
-      this.annotations.element,
+      h('div', { class: 'side' }, this.annotations.element, this.gaze.element),
       this.strip.element,
       this.help.dialog,
     );
     handleMapPointer(this.map, controller.mapGestures());
     handleVideoPointer(this.video.element, controller.videoGestures());
-    handleKeys(controller, this.map, this.video, this.help);
+    handleKeys(controller, gaze, this.map, this.video, this.help);
   }
 
   start(): void {
+    window.addEventListener('pagehide', () => this.pilot.leave());
     // The first picture comes first; three.js, the larger part of the page, after it.
     setTimeout(() => this.loadMap(), MAP_AT_LATEST_MS);
     requestAnimationFrame((nowMs) => this.frame(nowMs));
@@ -86,7 +101,12 @@ export class App {
     this.video.draw();
     this.map.draw(nowMs, this.screen.rate(nowMs));
     state.expire(nowMs);
-    const version = `${state.version} ${session.annotations.version} ${session.link.kind}`;
+    this.notice.update(nowMs);
+    this.pilot.check();
+    const version = [
+      ...[state.version, session.annotations.version, session.link.kind],
+      ...[this.pilot.version, gazeKey(session.gaze)],
+    ].join();
     if (version === this.panelsVersion && nowMs - this.panelsMs < PANEL_MS) return;
     this.panelsVersion = version;
     this.panelsMs = nowMs;
@@ -98,6 +118,8 @@ export class App {
       freeze: this.video.frozen,
     });
     this.annotations.update();
+    this.gaze.update();
+    setClass(this.element, 'no-head', !hasHead(session.gaze));
   }
 
   private measure(): void {

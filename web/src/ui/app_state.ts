@@ -1,6 +1,9 @@
-import type { Pixel } from '../geometry/vec3';
+import type { Pixel, Vec3 } from '../geometry/vec3';
 import type { Landing } from '../tools/landing';
 import type { CommandName, ToolName } from '../tools/tools';
+
+/** Where a refusal is shown: beside what could not be done. */
+export type Place = ToolName | CommandName | PaneName | 'head' | `annotation ${string}`;
 
 export type PaneName = 'map' | 'video';
 
@@ -19,6 +22,12 @@ export class AppState {
   hover: Hover | undefined;
   main: PaneName = 'map';
   confirmingReset = false;
+  /** Of new marks, 0xRRGGBBAA. */
+  colorRgba = 0xffffffff;
+  /** The head turns as fast as it can. */
+  fast = false;
+  /** What the camera was asked to look at, until the server says that it does. */
+  askedInWorld: Vec3 | undefined;
   /** Why something could not be done, beside the thing that could not. */
   private readonly refusals = new Map<string, { text: string; untilMs: number }>();
   /** Rises with every change that panels show. */
@@ -28,12 +37,12 @@ export class AppState {
     ++this.version;
   }
 
-  refuse(where: CommandName | PaneName | `annotation ${string}`, text: string): void {
+  refuse(where: Place, text: string): void {
     this.refusals.set(where, { text, untilMs: performance.now() + 6000 });
     this.changed();
   }
 
-  refusal(where: CommandName | PaneName | `annotation ${string}`): string | undefined {
+  refusal(where: Place): string | undefined {
     return this.refusals.get(where)?.text;
   }
 

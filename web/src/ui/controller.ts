@@ -7,7 +7,8 @@ import { type Landing, landingInMap, landingInVideo, rayThrough } from '../tools
 import { pickNearest } from '../tools/pick';
 import { type CommandName, shapeOf, type ToolName } from '../tools/tools';
 import type { AnnotationActions } from './annotations_panel';
-import type { AppState, PaneName } from './app_state';
+import type { AppState, PaneName, Place } from './app_state';
+import type { GazeController } from './gaze_controller';
 import type { MapPane } from './map_pane';
 import type { MapGestures } from './pointer';
 import type { ToolActions } from './tools_column';
@@ -26,9 +27,12 @@ export class Controller implements ToolActions, AnnotationActions {
     private readonly state: AppState,
     private readonly map: MapPane,
     private readonly video: VideoPane,
+    private readonly gaze: GazeController,
   ) {}
 
   choose(tool: ToolName): void {
+    const whyNot = tool === 'gaze' ? this.gaze.whyNot() : undefined;
+    if (whyNot) return this.state.refuse('gaze', whyNot);
     this.state.tool = tool;
     this.state.hover = undefined;
     this.state.changed();
@@ -172,7 +176,7 @@ export class Controller implements ToolActions, AnnotationActions {
 
   private hover(pane: PaneName, pixel: Pixel | undefined): void {
     const { state } = this;
-    const placing = shapeOf(state.tool) !== undefined;
+    const placing = state.tool !== 'select';
     state.hover =
       placing && pixel ? { pane, pixel, landing: this.landing(pane, pixel) } : undefined;
     if (placing) state.changed();
@@ -209,17 +213,19 @@ export class Controller implements ToolActions, AnnotationActions {
 
   private act(pane: PaneName, landing: Landing | undefined, picked: Annotation | undefined): void {
     const { state } = this;
+    if (state.tool === 'gaze') return this.look(pane, landing, picked);
     const shape = shapeOf(state.tool);
     if (!shape) {
       state.selectedId = picked?.id;
       return state.changed();
     }
     if (!this.session.live) return state.refuse(pane, 'Not placed: no connection to the server.');
-    if (!landing) return state.refuse(pane, this.whyNoLanding(pane));
+    if (!landing) return state.refuse(pane, `Not placed: ${this.whyNoLanding(pane)}`);
     this.attempt(pane, async () => {
       const placed = await this.edits.place({
         shape,
         text: '',
+        colorRgba: state.colorRgba,
         target: landing.target,
         later: landing.later,
         guessInWorld: landing.pointInWorld,
@@ -233,18 +239,37 @@ export class Controller implements ToolActions, AnnotationActions {
   private whyNoLanding(pane: PaneName): string {
     const pose = pane === 'video' ? this.video.current()?.facts.pose : this.session.pose;
     if (!isPlaced(pose)) {
-      return 'Not placed: where the camera is is not known now.';
+      return 'where the camera is is not known now.';
     }
-    return pane === 'map'
-      ? 'Not placed: nothing is mapped there.'
-      : 'Not placed: outside the lens.';
+    return pane === 'map' ? 'nothing is mapped there.' : 'outside the lens.';
+  }
+
+  /** Turns the camera there; a mark there is followed, if it is moved. */
+  private look(pane: PaneName, landing: Landing | undefined, picked: Annotation | undefined): void {
+    if (picked) return this.gaze.lookAtMark(picked, pane);
+    if (!landing) return this.state.refuse(pane, `Not turned: ${this.whyNoLanding(pane)}`);
+    if (pane === 'video' && this.video.frozen && !landing.later) {
+      return this.state.refuse(pane, 'Not turned: the map has changed since this picture.');
+    }
+    this.gaze.lookAtLanding(landing, pane);
+  }
+
+  lookAt(id: string): void {
+    const annotation = this.session.annotations.get(id);
+    if (annotation) this.gaze.lookAtMark(annotation, `annotation ${id}`);
+  }
+
+  /** Of new marks, and of the selected one. */
+  paint(colorRgba: number): void {
+    const { state } = this;
+    state.colorRgba = colorRgba;
+    state.changed();
+    const id = state.selectedId;
+    if (id) this.attempt(`annotation ${id}`, () => this.edits.setColour(id, colorRgba));
   }
 
   /** Runs an edit; a refusal is shown where it was asked for. */
-  private attempt(
-    where: CommandName | PaneName | `annotation ${string}`,
-    edit: () => Promise<unknown>,
-  ): void {
+  private attempt(where: Place, edit: () => Promise<unknown>): void {
     edit()
       .catch((error: unknown) => {
         const reason = error instanceof EditError ? error.message : String(error);

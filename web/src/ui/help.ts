@@ -1,5 +1,5 @@
-import { COMMANDS, TOOLS } from '../tools/tools';
-import { FEATURE_CSS } from '../scene/feature_css';
+import { COMMANDS, HEAD_COMMANDS, TOOLS } from '../tools/tools';
+import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { FeatureState } from '../session/types';
 import { h } from './dom';
 
@@ -20,15 +20,17 @@ export class Help {
 
   constructor() {
     const keys = h('dl', {});
-    for (const { label, shown, hint } of [...TOOLS, ...COMMANDS]) {
+    for (const { label, shown, hint } of [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS]) {
       keys.append(h('dt', {}, h('kbd', {}, shown), label), h('dd', {}, hint));
     }
     const legend = h('ul', { class: 'legend' });
-    for (const [state, sign, words] of LEGEND) {
+    const explain = (colour: string, sign: string, words: string): void => {
       const mark = h('span', { class: 'sign' }, sign);
-      mark.style.color = FEATURE_CSS[state];
+      mark.style.color = colour;
       legend.append(h('li', {}, mark, words));
-    }
+    };
+    for (const [state, sign, words] of LEGEND) explain(FEATURE_CSS[state], sign, words);
+    explain(TARGET_CSS, '⌖', 'what the camera is to look at; its ring is solid once it is held');
     const close = h('button', { type: 'button' }, 'Close');
     close.addEventListener('click', () => this.dialog.close());
     this.dialog = h(

@@ -1,18 +1,25 @@
-import type { CommandName, ToolName } from '../tools/tools';
+import type { CommandName, HeadCommandName, ToolName } from '../tools/tools';
 
 /** Line drawings on a 20 x 20 field. */
-export const ICONS: Record<ToolName | CommandName | 'help', string> = {
+export const ICONS: Record<ToolName | CommandName | HeadCommandName | 'help', string> = {
   select: 'M5 3l10 7-4.5.8 2.6 4.7-2 1.1-2.6-4.7L5 15z',
   cube: 'M10 2.5l6.5 3.7v7.6L10 17.5l-6.5-3.7V6.2zM3.5 6.2L10 10l6.5-3.8M10 10v7.5',
   note: 'M3.5 3.5h13v9h-7l-3.5 4v-4h-2.5zM6.5 6.5h7M6.5 9.5h4.5',
   arrow: 'M10 2.5v14M5.5 12l4.5 4.5 4.5-4.5',
+  gaze: 'M2 10s3-5 8-5 8 5 8 5-3 5-8 5-8-5-8-5zM10 7.5a2.5 2.5 0 100 5 2.5 2.5 0 000-5z',
+  stop: 'M5.5 5.5h9v9h-9z',
+  home: 'M10 16.5v-12M5.5 9L10 4.5 14.5 9',
+  level: 'M2.5 10h15M6 6.5v7M14 6.5v7',
+  explore: 'M9 3.5a5.5 5.5 0 100 11 5.5 5.5 0 000-11zM13 13l4 4',
+  fast: 'M4 5l5 5-5 5M10.5 5l5 5-5 5',
+  lease: 'M10 3.5a6.5 6.5 0 100 13 6.5 6.5 0 000-13zM10 8v8.5M3.7 8.5h12.6',
   undo: 'M8 4L4 8l4 4M4 8h7.5a4.5 4.5 0 010 9H8',
   redo: 'M12 4l4 4-4 4M16 8H8.5a4.5 4.5 0 000 9H12',
-  delete: 'M4 5.5h12M8 5.5V3.5h4v2M5.5 5.5l.8 11h7.400l.8-11M8.5 8.5v5M11.5 8.5v5',
+  delete: 'M4 5.5h12M8 5.5V3.5h4v2M5.5 5.5l.8 11h7.4l.8-11M8.5 8.5v5M11.5 8.5v5',
   freeze: 'M7 4v12M13 4v12',
   swap: 'M4 7h11M12 4l3 3-3 3M16 13H5M8 10l-3 3 3 3',
   follow: 'M10 6.5a3.5 3.5 0 100 7 3.5 3.5 0 000-7zM10 2v3M10 15v3M2 10h3M15 10h3',
   frame: 'M3 7V3h4M13 3h4v4M17 13v4h-4M7 17H3v-4M8 8h4v4H8z',
   reset: 'M15.5 6.5A6.5 6.5 0 1016.5 10M16 3v4h-4',
-  help: 'M7.5 7.5a2.5 2.5 0 115 0c0 1.800-2.5 2-2.5 4M10 14.5v.500',
+  help: 'M7.5 7.5a2.5 2.5 0 115 0c0 1.8-2.5 2-2.5 4M10 14.5v.5',
 };

@@ -1,17 +1,28 @@
-import { controlOf, TOOLS, type ToolName, type CommandName } from '../tools/tools';
+import {
+  type CommandName,
+  controlOf,
+  HEAD_COMMANDS,
+  type HeadCommandName,
+  type ToolName,
+  TOOLS,
+} from '../tools/tools';
 import type { Controller } from './controller';
+import type { GazeController } from './gaze_controller';
 import type { Help } from './help';
 import type { MapPane } from './map_pane';
 import type { VideoPane } from './video_pane';
 
 const TURN_RAD = 0.12;
 
-const isTool = (name: ToolName | CommandName): name is ToolName =>
-  TOOLS.some((tool) => tool.name === name);
+type Name = ToolName | CommandName | HeadCommandName;
+const isTool = (name: Name): name is ToolName => TOOLS.some((tool) => tool.name === name);
+const isHeadCommand = (name: Name): name is HeadCommandName =>
+  HEAD_COMMANDS.some((command) => command.name === name);
 
 /** Everything the pointer does, by key. */
 export function handleKeys(
   controller: Controller,
+  gaze: GazeController,
   map: MapPane,
   video: VideoPane,
   help: Help,
@@ -23,7 +34,9 @@ export function handleKeys(
     if (event.key === 'Escape') controller.escape();
     if (!name) return;
     event.preventDefault();
+    if (event.repeat && isHeadCommand(name)) return;
     if (isTool(name)) controller.choose(name);
+    else if (isHeadCommand(name)) gaze.run(name);
     else controller.run(name);
   });
   map.element.addEventListener('keydown', (event) => {

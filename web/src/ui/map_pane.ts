@@ -1,6 +1,8 @@
 import type { Pixel } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
+import { lineOfSight } from '../scene/gaze_sight';
 import type { MapView } from '../scene/map_view';
+import { gazeKey } from '../session/gaze';
 import type { Session } from '../session/session';
 import { isPlaced } from '../session/types';
 import type { AppState } from './app_state';
@@ -14,6 +16,7 @@ export class MapPane extends Pane {
   private readonly canvas: HTMLCanvasElement;
   private drawnState = -1;
   private drawnAnnotations = -1;
+  private drawnGaze = '';
 
   constructor(session: Session, player: Player, state: AppState) {
     const canvas = h('canvas', { class: 'map' });
@@ -68,9 +71,11 @@ export class MapPane extends Pane {
         : undefined,
     );
     const { version } = this.session.annotations;
-    if (!moved && version === this.drawnAnnotations && this.state.version === this.drawnState)
-      return;
+    const gaze = gazeKey(this.session.gaze);
+    const changed = version !== this.drawnAnnotations || gaze !== this.drawnGaze;
+    if (!moved && !changed && this.state.version === this.drawnState) return;
     this.drawnAnnotations = version;
+    this.drawnGaze = gaze;
     this.drawnState = this.state.version;
     this.drawOver(map.view(), width, height);
   }
@@ -78,10 +83,21 @@ export class MapPane extends Pane {
   private drawOver(view: View, width: number, height: number): void {
     this.painter.begin({ width, height }, { left: 0, top: 0, scale: 1 });
     this.drawMarks(view);
+    this.drawSight(view);
     this.drawLanding(view, ({ landing }) => landing && projectPoint(view, landing.pointInWorld));
     const { translation: t, rotation: q } = view.worldFromCamera;
     this.canvas.dataset['eye'] = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].join(' ');
     this.canvas.dataset['focalPx'] = String(view.camera.intrinsics.fx);
+  }
+
+  /** The target, and the line to it from the camera as it is in the picture shown. */
+  private drawSight(view: View): void {
+    const target = this.session.gaze?.targetInWorld;
+    const pose = this.player.shown?.facts.pose;
+    if (target && isPlaced(pose)) {
+      this.painter.lineOfSight(lineOfSight(view, pose.worldFromCamera.translation, target));
+    }
+    this.drawTarget(view, target && projectPoint(view, target));
   }
 
   private updateNote(): void {

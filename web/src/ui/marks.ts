@@ -1,4 +1,4 @@
-import { type Mark, markOf } from '../scene/strokes';
+import { colourOf, type Mark, markOf } from '../scene/strokes';
 import type { AnnotationBook } from '../session/annotation_book';
 
 /** Everything to draw: the server's annotations, and ours that it has not answered yet. */
@@ -16,7 +16,7 @@ export function allMarks(book: AnnotationBook): Mark[] {
       sizeM: pending.sizeM,
       pointInWorld: pending.pointInWorld,
       inkOffsetsM: [],
-      colour: '#ffffff',
+      colour: colourOf(pending),
       hollow: true,
     });
   }

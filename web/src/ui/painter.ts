@@ -1,5 +1,5 @@
 import type { Pixel } from '../geometry/vec3';
-import { FEATURE_CSS } from '../scene/feature_css';
+import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { EdgeArrow } from '../scene/edge_arrows';
 import type { AxisStroke, Marks } from '../scene/strokes';
 import type { FeatureState } from '../session/types';
@@ -19,6 +19,7 @@ export class Painter {
   private left = 0;
   private top = 0;
   private ratio = 1;
+  private right = 0; // edge of what is drawn on [canvas px]
 
   constructor() {
     this.canvas.className = 'marks';
@@ -37,6 +38,7 @@ export class Painter {
     const height = Math.round(pane.height * this.ratio);
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
+    this.right = width;
     this.context.clearRect(0, 0, width, height);
     this.scale = rect.scale * this.ratio;
     this.left = rect.left * this.ratio;
@@ -47,6 +49,7 @@ export class Painter {
 
   /** Restricts drawing to the picture; `end` lifts it. */
   clip(width: number, height: number): void {
+    this.right = this.left + width * this.scale;
     this.context.save();
     this.context.beginPath();
     this.context.rect(this.left, this.top, width * this.scale, height * this.scale);
@@ -166,8 +169,99 @@ export class Painter {
     else this.stroke(FEATURE_CSS[state], 1.8);
   }
 
-  axes(axes: readonly AxisStroke[]): void {
+  /** The fixation target: a ring with four ticks, solid once it is held, and few words beside it. */
+  target(at: Pixel, held: boolean, words: string): void {
     const { context, ratio } = this;
+    const [x, y] = [this.x(at), this.y(at)];
+    const r = 13 * ratio * this.thinning;
+    const ring = (): void => {
+      context.beginPath();
+      context.arc(x, y, r, 0, 2 * Math.PI);
+    };
+    const ticks = (): void => {
+      context.beginPath();
+      for (const [dx, dy] of [
+        [1, 0],
+        [0, 1],
+        [-1, 0],
+        [0, -1],
+      ] as const) {
+        context.moveTo(x + dx * r * 0.55, y + dy * r * 0.55);
+        context.lineTo(x + dx * r * 1.55, y + dy * r * 1.55);
+      }
+    };
+    for (const draw of [ring, ticks]) {
+      draw();
+      this.stroke(HALO, 5.5);
+    }
+    if (!held) context.setLineDash([4 * ratio, 4 * ratio]);
+    ring();
+    this.stroke(TARGET_CSS, 2.5);
+    context.setLineDash([]);
+    ticks();
+    this.stroke(TARGET_CSS, 2.5);
+    const right = x + r * 1.7;
+    const left = right + 110 * ratio > this.right; // near the edge: on the other side
+    if (left) context.textAlign = 'right';
+    this.words(words, left ? x - r * 1.7 : right, y + r * 1.3, TARGET_CSS);
+    context.textAlign = 'left';
+  }
+
+  /** From the camera to what it is to look at. */
+  lineOfSight(pieces: readonly (readonly Pixel[])[]): void {
+    this.context.setLineDash([7 * this.ratio, 6 * this.ratio]);
+    for (const piece of pieces) {
+      this.trace(piece);
+      this.stroke(HALO, 4.5);
+      this.stroke(TARGET_CSS, 2);
+    }
+    this.context.setLineDash([]);
+  }
+
+  /** The optic axis: what is held appears here. */
+  centre(at: Pixel): void {
+    const arm = 5 * this.ratio;
+    const [x, y] = [this.x(at), this.y(at)];
+    const cross = (): void => {
+      this.context.beginPath();
+      this.context.moveTo(x - arm, y);
+      this.context.lineTo(x + arm, y);
+      this.context.moveTo(x, y - arm);
+      this.context.lineTo(x, y + arm);
+    };
+    cross();
+    this.stroke(HALO, 4);
+    cross();
+    this.stroke(LINE, 1.5);
+  }
+
+  /** Words inside the edge that an arrow points to. */
+  arrowWords(words: string, { tip, direction }: EdgeArrow): void {
+    const { context, ratio } = this;
+    const away = 30 * ratio;
+    context.textAlign = direction.u > 0.4 ? 'right' : direction.u < -0.4 ? 'left' : 'center';
+    this.words(
+      words,
+      this.x(tip) - direction.u * away,
+      this.y(tip) - direction.v * away,
+      TARGET_CSS,
+    );
+    context.textAlign = 'left';
+  }
+
+  /** With a halo, from the middle of the line [canvas px]. */
+  private words(text: string, x: number, y: number, colour: string): void {
+    const { context, ratio } = this;
+    context.font = FONT.replace('13', String(12 * ratio));
+    context.textBaseline = 'middle';
+    context.lineWidth = 3.5 * ratio;
+    context.strokeStyle = HALO;
+    context.strokeText(text, x, y);
+    context.fillStyle = colour;
+    context.fillText(text, x, y);
+  }
+
+  axes(axes: readonly AxisStroke[]): void {
     for (const { pieces } of axes) {
       for (const piece of pieces) {
         this.trace(piece);
@@ -175,15 +269,8 @@ export class Painter {
         this.stroke(AXIS, 1.5);
       }
     }
-    context.font = FONT.replace('13', String(12 * ratio));
-    context.textBaseline = 'middle';
     for (const { name, end } of axes) {
-      if (!end) continue;
-      context.lineWidth = 3 * ratio;
-      context.strokeStyle = HALO;
-      context.strokeText(name, this.x(end) + 5 * ratio, this.y(end));
-      context.fillStyle = AXIS;
-      context.fillText(name, this.x(end) + 5 * ratio, this.y(end));
+      if (end) this.words(name, this.x(end) + 5 * this.ratio, this.y(end), AXIS);
     }
   }
 
@@ -203,13 +290,6 @@ export class Painter {
     context.arc(this.x(at), this.y(at), 1.6 * ratio, 0, 2 * Math.PI);
     context.fillStyle = ACCENT;
     context.fill();
-    context.font = FONT.replace('13', String(12 * ratio)).replace('600', '500');
-    context.textBaseline = 'middle';
-    context.lineWidth = 3 * ratio;
-    context.strokeStyle = HALO;
-    const x = this.x(at) + r + 7 * ratio;
-    context.strokeText(words, x, this.y(at));
-    context.fillStyle = LINE;
-    context.fillText(words, x, this.y(at));
+    this.words(words, this.x(at) + r + 7 * ratio, this.y(at), LINE);
   }
 }

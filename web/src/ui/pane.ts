@@ -1,10 +1,11 @@
 import type { Pixel } from '../geometry/vec3';
-import type { View } from '../geometry/view';
+import { projectPoint, type View } from '../geometry/view';
 import { axisStrokes, type Mark, strokesOf } from '../scene/strokes';
 import type { Session } from '../session/session';
 import { landingWords, ringRadius } from '../tools/landing';
 import type { AppState, Hover, PaneName } from './app_state';
 import { h, setText } from './dom';
+import { targetLabel } from './gaze_words';
 import { allMarks } from './marks';
 import { Painter } from './painter';
 import type { Player } from './player';
@@ -48,6 +49,15 @@ export abstract class Pane {
     this.painter.axes(axisStrokes(view));
     this.painter.marks(strokesOf(view, marks), this.accented);
     return marks;
+  }
+
+  /** The fixation target where it appears at `at`; what was asked for until the server answers. */
+  protected drawTarget(view: View, at: Pixel | undefined): void {
+    const { gaze } = this.session;
+    const asked = this.state.askedInWorld;
+    const askedAt = asked && projectPoint(view, asked);
+    if (askedAt) this.painter.target(askedAt, false, 'asking');
+    else if (gaze && at) this.painter.target(at, gaze.arrived, targetLabel(gaze));
   }
 
   /** Where a click would land, if the pointer is over this pane: `at` says where to draw that. */

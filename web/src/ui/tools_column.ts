@@ -13,7 +13,7 @@ export interface ToolActions {
 export class ToolsColumn {
   readonly element = h('nav', { 'aria-label': 'Tools' });
   private readonly buttons = new Map<string, HTMLButtonElement>();
-  private readonly reasons = new Map<CommandName, HTMLElement>();
+  private readonly reasons = new Map<ToolName | CommandName, HTMLElement>();
   private readonly confirm: HTMLElement;
 
   constructor(private readonly actions: ToolActions) {
@@ -21,20 +21,17 @@ export class ToolsColumn {
     this.element.append(h('hr'));
     for (const command of COMMANDS) {
       if (command.name === 'reset') this.element.append(h('span', { class: 'space' }));
-      const item = this.add(command, () => actions.run(command.name));
-      const reason = h('span', { class: 'reason', role: 'alert' });
-      this.reasons.set(command.name, reason);
-      item.append(reason);
+      this.add(command, () => actions.run(command.name));
     }
     this.confirm = this.makeConfirm();
     this.buttons.get('reset')?.parentElement?.append(this.confirm);
   }
 
-  private add(control: Control<string>, act: () => void): HTMLElement {
+  private add(control: Control<ToolName | CommandName>, act: () => void): void {
     const button = h(
       'button',
       { type: 'button', 'data-control': control.name, 'aria-label': control.label },
-      icon(ICONS[control.name as ToolName | CommandName]),
+      icon(ICONS[control.name]),
       h('kbd', {}, control.shown),
     );
     button.addEventListener('click', act);
@@ -45,9 +42,9 @@ export class ToolsColumn {
       h('b', {}, control.label),
       control.hint,
     );
-    const item = h('div', { class: 'tool' }, button, tip);
-    this.element.append(item);
-    return item;
+    const reason = h('span', { class: 'reason', role: 'alert' });
+    this.reasons.set(control.name, reason);
+    this.element.append(h('div', { class: 'tool' }, button, tip, reason));
   }
 
   private makeConfirm(): HTMLElement {

@@ -1,10 +1,12 @@
 import type { Pixel } from '../geometry/vec3';
 import { makeView, projectPoint, type View } from '../geometry/view';
 import { edgeArrowsOf } from '../scene/edge_arrows';
+import { sightInPicture } from '../scene/gaze_sight';
 import type { Session } from '../session/session';
 import { pageNowMs } from '../session/clock';
 import { type FrameFacts, isPlaced } from '../session/types';
 import type { AppState } from './app_state';
+import { targetLabel } from './gaze_words';
 import { Pane } from './pane';
 import type { Player } from './player';
 import { Still } from './still';
@@ -99,7 +101,23 @@ export class VideoPane extends Pane {
     this.drawFeatures(facts, view);
     const marks = this.drawMarks(view);
     this.painter.edgeArrows(edgeArrowsOf(view, marks), this.accented);
+    this.drawSight(view);
     this.drawLanding(view, ({ pixel }) => pixel);
+  }
+
+  /** What the camera is to look at, and where it looks now: the distance is the error. */
+  private drawSight(view: View): void {
+    const { gaze } = this.session;
+    const sight = gaze && sightInPicture(view, gaze);
+    if (sight) {
+      const { cx, cy } = view.camera.intrinsics;
+      this.painter.centre({ u: cx, v: cy });
+    }
+    if (gaze && sight?.arrow) {
+      this.painter.edgeArrows([sight.arrow], []);
+      this.painter.arrowWords(targetLabel(gaze), sight.arrow);
+    }
+    this.drawTarget(view, sight?.at);
   }
 
   /**

@@ -1,5 +1,6 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
+//        [--part page|gaze]   (page: everything but the turning of the head; gaze: that alone)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -15,6 +16,7 @@ const { values: options } = parseArgs({
     chromium: { type: 'string', default: '/usr/bin/chromium' },
     seed: { type: 'string', default: '1' },
     shots: { type: 'string' },
+    part: { type: 'string', default: 'page' },
   },
 });
 
@@ -31,7 +33,10 @@ for (const [path, remedy] of Object.entries(needed)) {
   console.log(`skipped: no ${path}; ${remedy}`);
   process.exit(77);
 }
-const { runChecks } = await import('./checks.mjs');
+const runChecks =
+  options.part === 'gaze'
+    ? (await import('./gaze.mjs')).runGaze
+    : (await import('./checks.mjs')).runChecks;
 
 const folder = mkdtempSync(join(tmpdir(), 'saccade-browser-test-'));
 /** A port that is free now: the restarted server has to come back to the same one. */

@@ -94,6 +94,7 @@ describe('placing in a frozen picture', () => {
   const placement: Placement = {
     shape: 'cube',
     text: '',
+    colorRgba: 0xff9a3dff,
     target: { kind: 'pixel', frameId: 7, pixel: { u: 3, v: 4 } },
     later: ray,
     guessInWorld: undefined,

@@ -7,7 +7,7 @@ import { cubeEdges, markOf, strokesOf } from '../../src/scene/strokes';
 import type { Annotation, Feature } from '../../src/session/types';
 import { landingInMap, landingInVideo, landingWords, ringRadius } from '../../src/tools/landing';
 import { pickNearest } from '../../src/tools/pick';
-import { COMMANDS, controlOf, TOOLS } from '../../src/tools/tools';
+import { COMMANDS, controlOf, HEAD_COMMANDS, TOOLS } from '../../src/tools/tools';
 import { anchorWords, presenceWords, statusWords } from '../../src/ui/words';
 
 const camera = new Camera({
@@ -164,9 +164,10 @@ describe('controls', () => {
     controlOf({ key, ctrlKey: false, altKey: false, metaKey: false, shiftKey: false, ...mods });
 
   it('have one key each', () => {
-    const keys = [...TOOLS, ...COMMANDS].map(({ key }) => key);
+    const keys = [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS].map(({ key }) => key);
     expect(new Set(keys).size).toBe(keys.length);
-    for (const { key, name } of [...TOOLS, ...COMMANDS]) expect(press(key)).toBe(name);
+    for (const { key, name } of [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS])
+      expect(press(key)).toBe(name);
   });
 
   it('leave the browser its own shortcuts', () => {

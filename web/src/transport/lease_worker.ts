@@ -1,0 +1,44 @@
+import { createClient } from '@connectrpc/connect';
+import { createGrpcWebTransport } from '@connectrpc/connect-web';
+import { GazeService } from '../gen/saccade/v1/gaze_pb';
+import type { FromKeeper, ToKeeper } from './lease_keeper';
+import { HEARTBEAT_MS, LeaseLoop } from './lease_loop';
+
+/*
+ * Heartbeats off the main thread: a page that draws, or is in the background, must not lose the head
+ * by a late one. It lives and dies with its page.
+ */
+const post = (message: FromKeeper): void => self.postMessage(message);
+let loop: LeaseLoop | undefined;
+let ending = false;
+
+function begin(baseUrl: string, sessionId: string, leaseId: string): void {
+  const client = createClient(GazeService, createGrpcWebTransport({ baseUrl }));
+  loop = new LeaseLoop(
+    (session, lease) =>
+      client.acquireLease({ sessionId: session, leaseId: lease }, { timeoutMs: 2000 }),
+    sessionId,
+    leaseId,
+    (told) => post({ kind: 'told', told }),
+    performance.now(),
+  );
+  setInterval(() => {
+    if (!ending) loop?.beat(performance.now());
+    else if (loop?.end()) post({ kind: 'ended' });
+  }, HEARTBEAT_MS);
+}
+
+self.addEventListener('message', ({ data: message }: MessageEvent<ToKeeper>) => {
+  switch (message.kind) {
+    case 'begin':
+      begin(message.baseUrl, message.sessionId, message.leaseId);
+      break;
+    case 'alive':
+      loop?.alive(performance.now());
+      break;
+    case 'end':
+      ending = true;
+      if (!loop || loop.end()) post({ kind: 'ended' });
+      break;
+  }
+});

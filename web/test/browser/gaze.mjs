@@ -1,0 +1,189 @@
+// An expert turns the (simulated) head from the page: the real server, the real controller, and the
+// simulator's truth about where the camera really looks.
+import { join } from 'node:path';
+import { Expert } from './expert.mjs';
+import { inCamera, inWorld, length, project, times, unproject } from './optics.mjs';
+import { startServer, Truth } from './server.mjs';
+import { createClient } from '@connectrpc/connect';
+import { createGrpcWebTransport } from '@connectrpc/connect-web';
+import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
+
+const LIMIT_DEG = 2;
+const BORDER_PX = 60; // the click is well inside
+
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+export async function runGaze({ server: binary, chromium, seed, shots, folder }) {
+  const truthFile = join(folder, 'gaze-truth.jsonl');
+  const server = await startServer(binary, [
+    ...['--source', `sim:desk?seed=${seed}&motion=stand`, '--mount', 'sim'],
+    ...['--sim-truth', truthFile, '--data-dir', join(folder, 'gaze-data')],
+    ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
+  ]);
+  const context = { failures: 0, shots };
+  context.check = (name, ok, figures) => {
+    console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
+    if (!ok) ++context.failures;
+  };
+  try {
+    const transport = createGrpcWebTransport({ baseUrl: server.http });
+    const joined = await createClient(SessionService, transport).join({ displayName: 'test' });
+    context.camera = joined.intrinsics;
+    context.truth = new Truth(truthFile);
+    context.ann = await Expert.open(chromium, `${server.http}/?name=Ann`);
+    await context.ann.waitForStatus(/^tracking/, 60_000);
+    await turnAndHold(context);
+    await handsChange(context, `${server.http}/?name=Bob`);
+    const { errors } = context.ann;
+    context.check('page errors', errors.length === 0, errors.join('; ') || 'none');
+  } finally {
+    await context.ann?.close();
+    await server.stop();
+    context.truth?.close();
+  }
+  return context.failures;
+}
+
+/** What the gaze panel says. */
+const panelOf = (page) =>
+  page.evaluate(() => {
+    const element = document.querySelector('section.gaze');
+    const read = (selector) => element.querySelector(selector).textContent;
+    const { mode, arrived } = element.dataset;
+    const texts = { doing: read('.doing'), steer: read('.steer'), why: read('.why') };
+    const notice = document.querySelector('.handover').textContent;
+    return { mode, arrived: arrived === 'true', error: read('.error'), notice, ...texts };
+  });
+
+/** Waits until the panel is as wanted; what it said last, and whether that was it. */
+async function panelWhen(page, wanted, timeoutMs) {
+  const end = Date.now() + timeoutMs;
+  for (;;) {
+    const panel = await panelOf(page);
+    const ok = wanted(panel);
+    if (ok || Date.now() > end) return { ok, panel };
+    await sleep(40);
+  }
+}
+
+async function shot({ shots }, page, name) {
+  if (shots) await page.screenshot({ path: join(shots, `${name}.png`) });
+}
+
+/** Clicks what is farthest from the middle; then again in the map, on another object. */
+async function turnAndHold(context) {
+  const { ann, check } = context;
+  await ann.press('g');
+  for (const pane of ['video', 'map']) {
+    await ann.enlarge(pane);
+    const object = pane === 'video' ? await clickInVideo(context) : await clickInMap(context);
+    if (!object) throw new Error(`nothing to click in the ${pane}`);
+    const begin = performance.now();
+    const turning = await panelWhen(ann.page, ({ mode }) => mode === 'saccade', 2000);
+    await sleep(350);
+    await shot(context, ann.page, `gaze-${pane}-saccade`);
+    const holding = await panelWhen(
+      ann.page,
+      ({ mode, arrived }) => mode === 'fixate' && arrived,
+      8000,
+    );
+    const seconds = (performance.now() - begin) / 1000;
+    await sleep(500);
+    const { error, doing } = await panelOf(ann.page);
+    const truth = trueError(context, (await ann.look()).id, object);
+    await shot(context, ann.page, `gaze-${pane}-hold`);
+    check(
+      `a click in the ${pane} turns the camera, which then holds within ${LIMIT_DEG} deg`,
+      turning.ok && holding.ok && parseFloat(error) < LIMIT_DEG && truth < LIMIT_DEG,
+      `${object.name}: "${doing}" after ${seconds.toFixed(1)} s, shown error ${error}, ` +
+        `true error ${truth.toFixed(2)} deg`,
+    );
+  }
+}
+
+/** The true angle between the optic axis of a frame and an object. */
+function trueError({ truth }, id, { point_in_world_m: point }) {
+  const at = inCamera(truth.frame(id).world_from_camera, point);
+  return (Math.acos(times(at, 1 / length(at))[2]) * 180) / Math.PI;
+}
+
+async function clickInVideo({ ann, truth, camera }) {
+  const { id, left, top, scale, width, height } = await ann.look();
+  const away = ({ pixel: [u, v] }) => Math.hypot(u - width / 2, v - height / 2);
+  const seen = truth
+    .frame(id)
+    .objects.filter(({ visible, pixel }) => visible && pixel)
+    .filter(
+      ({ pixel: [u, v] }) =>
+        u > BORDER_PX && u < width - BORDER_PX && v > BORDER_PX && v < height - BORDER_PX,
+    )
+    .sort((a, b) => away(b) - away(a));
+  for (const object of seen) {
+    const at = [left + (object.pixel[0] + 0.5) * scale, top + (object.pixel[1] + 0.5) * scale];
+    if (!(await ann.isOver('.video', at))) continue;
+    await ann.click(at);
+    return clickedAt(ann, truth, camera, object);
+  }
+  return undefined;
+}
+
+/** What lay under the click in the frame that was on the screen by then, at its object's depth. */
+async function clickedAt(ann, truth, camera, { name, point_in_world_m: point }) {
+  const { id, pixel } = await ann.pressed();
+  const pose = truth.frame(id).world_from_camera;
+  const clicked = unproject(camera, pixel, inCamera(pose, point)[2]);
+  return { name, point_in_world_m: inWorld(pose, clicked) };
+}
+
+/** The object that the camera has to turn farthest for, of those that the map shows. */
+async function clickInMap(context) {
+  const { ann, truth } = context;
+  await ann.press('h');
+  await sleep(400);
+  const view = await ann.mapView();
+  const eye = { fxPx: view.focal, fyPx: view.focal, cxPx: view.width / 2, cyPx: view.height / 2 };
+  const { id } = await ann.look();
+  const objects = truth
+    .frame(id)
+    .objects.filter(({ visible }) => visible)
+    .map((object) => ({ object, away: trueError(context, id, object) }))
+    .sort((a, b) => b.away - a.away);
+  for (const { object } of objects) {
+    const pixel = project({ ...eye, distortion: [] }, inCamera(view.pose, object.point_in_world_m));
+    if (!pixel) continue;
+    const at = [view.left + pixel[0], view.top + pixel[1]];
+    if (!(await ann.isOver('.map3d', at))) continue;
+    await ann.click(at);
+    return object;
+  }
+  return undefined;
+}
+
+/** Another expert sees who pilots, waits, and has the head; it stops; and rests when he is gone. */
+async function handsChange(context, url) {
+  const { ann, check } = context;
+  const bob = await ann.context.newPage();
+  await bob.goto(url);
+  const seen = await panelWhen(bob, ({ steer }) => steer === 'Ann pilots', 10_000);
+  check('a second page sees who pilots', seen.ok, `"${seen.panel.steer}"`);
+  await bob.keyboard.press('q');
+  const waits = await panelWhen(bob, ({ steer }) => steer.includes('1st in the queue'), 4000);
+  const told = await panelWhen(ann.page, ({ steer }) => steer === 'you pilot · Bob waits', 4000);
+  check('he waits, and the pilot sees it', waits.ok && told.ok, `"${told.panel.steer}"`);
+
+  await ann.press('x');
+  const stopped = await panelWhen(ann.page, ({ mode }) => mode === 'stopped', 2000);
+  check('stop stops', stopped.ok, `"${stopped.panel.doing}"`);
+  await ann.press('q');
+  const his = await panelWhen(bob, ({ steer }) => steer === 'you pilot', 4000);
+  const notice = await panelWhen(ann.page, (panel) => panel.notice.includes('Bob pilots'), 2000);
+  await shot(context, ann.page, 'gaze-handover');
+  check(
+    'released, it is his turn, and everybody is told',
+    his.ok && notice.ok,
+    notice.panel.notice,
+  );
+  await bob.close();
+  const parked = await panelWhen(ann.page, ({ mode }) => mode === 'parked', 4000);
+  check('with his page gone the head parks', parked.ok, `"${parked.panel.doing}"`);
+}
