@@ -6,21 +6,48 @@
 
 #include "server/capture/source.hpp"
 #include "server/mount/crop_mount.hpp"
+#include "server/mount/dynamixel_mount.hpp"
 #include "server/mount/sim_mount.hpp"
+#include "server/mount/v4l2_mount.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {
 namespace {
 
+/// From the file, if there is one.
+template <typename Options>
+absl::Status Load(const ServerConfig& config, Options& options) {
+  return config.config_file.empty() ? absl::OkStatus() : options.LoadToml(config.config_file);
+}
+
 absl::StatusOr<std::shared_ptr<SimMount>> OpenSimMount(const ServerConfig& config) {
   SimMountOptions options;
   options.wall_clock = true;
   options.seed = config.seed;
-  if (!config.config_file.empty()) {
-    absl::Status loaded = options.mount.LoadToml(config.config_file);
-    if (!loaded.ok()) return loaded;
-  }
+  if (absl::Status loaded = Load(config, options.mount); !loaded.ok()) return loaded;
   return std::make_shared<SimMount>(options);
+}
+
+/// A head of motors, by what the URI names; null: none of these.
+absl::StatusOr<std::shared_ptr<Mount>> OpenRealMount(const ServerConfig& config) {
+  const auto [scheme, rest] =
+      std::pair<std::string, std::string>(absl::StrSplit(config.mount, absl::MaxSplits(':', 1)));
+  MountOptions mount;
+  if (absl::Status loaded = Load(config, mount); !loaded.ok()) return loaded;
+  if (scheme == "dynamixel") {
+    DynamixelOptions options;
+    absl::Status read = Load(config, options);
+    if (read.ok()) read = options.ReadUri(rest);
+    if (!read.ok()) return read;
+    return DynamixelMount::Create(options, mount);
+  }
+  if (scheme == "v4l2") {
+    V4l2Options options;
+    options.device = rest;
+    if (absl::Status read = Load(config, options); !read.ok()) return read;
+    return V4l2Mount::Create(options, mount);
+  }
+  return nullptr;
 }
 
 /// "WxH", or nothing: half of the picture.
@@ -68,6 +95,11 @@ absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config) {
   absl::StatusOr<std::unique_ptr<FrameSource>> source = sources.Open(config.source, options);
   if (!source.ok()) return source.status();
   OpenedSource opened{*std::move(source), head, std::nullopt};
+  if (head == nullptr) {
+    absl::StatusOr<std::shared_ptr<Mount>> real = OpenRealMount(config);
+    if (!real.ok()) return real.status();
+    opened.mount = *std::move(real);
+  }
   if (config.mount.rfind("crop:", 0) == 0) {
     absl::StatusOr<std::shared_ptr<CropMount>> crop =
         OpenCrop(config.mount.substr(5), opened.source->info().camera->intrinsics());

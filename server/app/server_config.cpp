@@ -1,6 +1,7 @@
 #include "server/app/server_config.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -26,7 +27,8 @@ struct Raw {
 void AddFlags(CLI::App& app, Raw& raw) {
   app.set_version_flag("--version", std::string("saccade-server ") + kVersion);
   app.add_option("--source", raw.source, "sim:desk[?...] | dataset:DIR");
-  app.add_option("--mount", raw.mount, "none | sim | crop:[WxH]");
+  app.add_option("--mount", raw.mount,
+                 "none | sim | dynamixel:DEVICE[?baud=N] | v4l2:DEVICE | crop:[WxH]");
   app.add_option("--config", raw.config, "TOML file; flags win over it");
   app.add_option("--data-dir", raw.data_dir, "annotations are kept here");
   app.add_option("--camera", raw.camera, "camera.yaml instead of the source's own");
@@ -77,8 +79,10 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
         return Bad(absl::StrCat(raw.config, ": unknown key video.", *keys.begin()));
       left.erase("video");
     }
-    // Read by TrackerOptions, GazeOptions and MountOptions.
-    for (const char* table : {"tracker", "gaze", "mount_model"}) left.erase(table);
+    // Read by TrackerOptions, GazeOptions and the mounts.
+    for (const char* table : {"tracker", "gaze", "mount_model", "dynamixel", "v4l2"}) {
+      left.erase(table);
+    }
     if (!left.empty()) return Bad(absl::StrCat(raw.config, ": unknown key ", *left.begin()));
   } catch (const std::exception& error) {
     return Bad(absl::StrCat("--config: ", raw.config, ": ", error.what()));
@@ -110,14 +114,21 @@ absl::Status CheckAddresses(const Raw& raw, ServerConfig& config) {
 }
 
 absl::Status CheckMount(const Raw& raw) {
-  if (raw.mount == "none") return absl::OkStatus();
-  if (raw.mount.rfind("crop:", 0) == 0) return absl::OkStatus();
-  if (raw.mount != "sim") {
+  const auto [scheme, rest] =
+      std::pair<std::string, std::string>(absl::StrSplit(raw.mount, absl::MaxSplits(':', 1)));
+  const bool has_rest = raw.mount.find(':') != std::string::npos;
+  if (raw.mount == "none" || (scheme == "crop" && has_rest)) return absl::OkStatus();
+  if (raw.mount != "sim" && (!has_rest || (scheme != "dynamixel" && scheme != "v4l2"))) {
     return Bad(absl::StrCat("--mount: '", raw.mount,
-                            "' is not served by this version: use none or sim, or crop:"));
+                            "' is not known: use none, sim, dynamixel:/dev/ttyUSB0, "
+                            "v4l2:/dev/video0 or crop:"));
   }
-  if (raw.source.rfind("sim:", 0) != 0) {
+  if (scheme == "sim" && raw.source.rfind("sim:", 0) != 0) {
     return Bad("--mount: sim turns the camera of a sim: source only");
+  }
+  if (scheme != "sim" && rest.empty()) {
+    return Bad(absl::StrCat("--mount: ", scheme, ": names no device: write for example ",
+                            scheme == "v4l2" ? "v4l2:/dev/video0" : "dynamixel:/dev/ttyUSB0"));
   }
   if (raw.speed == "max") {
     return Bad("--mount: a head moves by the clock: leave --speed max out");

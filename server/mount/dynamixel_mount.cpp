@@ -7,6 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "server/mount/fixed_joint.hpp"
+
 namespace saccade {
 namespace {
 
@@ -15,7 +17,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double kDemandHeld_s = 0.1;  // then the demanded rate counts as zero
 constexpr double kCheckEvery_s = 0.1;  // torque and hardware errors
 constexpr double kHoldRate_rad_s = 0.5;
-constexpr double kFixed_rad = 1e-6;
 
 std::chrono::nanoseconds Ns(double seconds) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
@@ -24,9 +25,7 @@ std::chrono::nanoseconds Ns(double seconds) {
 /// Joints without a motor stay at zero, and gaze knows it.
 MountOptions WithMotors(MountOptions mount, const DynamixelOptions& options) {
   for (std::size_t k = 0; k < kMountJoints; ++k) {
-    if (options.servos[k].id >= 0) continue;
-    mount.joints[k].min_rad = -kFixed_rad;
-    mount.joints[k].max_rad = kFixed_rad;
+    if (options.servos[k].id < 0) FixJoint(mount.joints[k]);
   }
   return mount;
 }

@@ -68,7 +68,13 @@ TEST(ServerConfig, BadUsageNamesTheFlagAndTheRemedy) {
   EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", "example.org:1"}), HasSubstr("IP address"));
   EXPECT_THAT(Error({"--source", "sim:desk", "--run-for", "-1"}), HasSubstr("--run-for"));
   EXPECT_THAT(Error({"--source", "sim:desk", "--run-for", "nan"}), HasSubstr("--run-for"));
-  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "warp"}), HasSubstr("none or sim"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "warp"}), HasSubstr("use none, sim"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "crop"}), HasSubstr("use none, sim"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "dynamixel:"}),
+              HasSubstr("dynamixel:/dev/ttyUSB0"));
+  EXPECT_EQ(
+      Good({"--source", "v4l2:/dev/video0", "--mount", "dynamixel:/dev/ttyUSB0?baud=57600"}).mount,
+      "dynamixel:/dev/ttyUSB0?baud=57600");
   EXPECT_EQ(Good({"--source", "dataset:/x", "--mount", "crop:320x240"}).mount, "crop:320x240");
   EXPECT_THAT(Error({"--source", "dataset:/x", "--mount", "sim"}), HasSubstr("sim: source only"));
   EXPECT_THAT(Error({"--source", "sim:desk", "--mount", "sim", "--speed", "max"}),
