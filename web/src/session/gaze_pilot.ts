@@ -171,6 +171,7 @@ export class GazePilot {
     if (place >= 0) {
       const pilot = state?.pilot?.displayName ?? 'somebody';
       const queuePosition = place + 1;
+      this.lost = '';
       this.begin(sessionId, { kind: 'answer', granted: false, leaseId: '', queuePosition, pilot });
     } else if (state?.lastHandover) {
       this.lost = `You pilot no longer: ${state.lastHandover}.`;

@@ -25,7 +25,7 @@ export class GazeController implements HeadActions {
     const { session } = this;
     if (!session.live) return 'No connection to the server.';
     if (hasHead(session.gaze)) return undefined;
-    return 'This camera is fixed to the wearer: there is no head to turn. Say where to look.';
+    return 'This camera is fixed to the wearer: there is no head to turn. Ask the wearer to look there.';
   }
 
   lookAtMark({ id, anchor }: Annotation, where: Place): void {
@@ -88,8 +88,12 @@ export class GazeController implements HeadActions {
       if (await this.pilot.acquire()) return act();
       const { lease } = this.pilot;
       if (lease.kind !== 'waiting') return;
+      const { gaze, participants } = this.session;
+      const taken = participants.some(
+        ({ sessionId, role }) => sessionId === gaze?.pilot?.sessionId && role === 'wearer',
+      );
       throw new GazeError(
-        `${lease.pilot} pilots. You are ${ordinal(lease.position)} in the queue: try again when it is your turn.`,
+        `${taken ? 'The wearer has taken over' : `${lease.pilot} pilots`}. You are ${ordinal(lease.position)} in the queue: try again when it is your turn.`,
       );
     });
   }

@@ -119,19 +119,22 @@ function towardsWords(gaze: Gaze, target: string): GazeWords {
 function unreachableWords({ angles, guidanceRad }: Gaze, missRad: number): string {
   const nearest = angles ? ` (${directionWords(angles)})` : '';
   const turn = guidanceRad === undefined ? '' : ` Ask the wearer to turn ${sideOf(guidanceRad)}.`;
-  return `The joints miss it by ${degrees(missRad)}; this is as near as they can look${nearest}.${turn}`;
+  return `The head misses it by ${degrees(missRad)}: this is as near as it can look${nearest}.${turn}`;
 }
 
 /** Few words beside the target's own mark. */
 export function targetLabel(gaze: Gaze): string {
   const number = gaze.errorRad === undefined ? '' : degrees(gaze.errorRad);
   if (gaze.targetLost) return 'target lost';
-  if (gaze.unreachable) {
-    const side = gaze.guidanceRad === undefined ? '' : `: wearer, turn ${sideOf(gaze.guidanceRad)}`;
-    return `out of reach${side}`;
-  }
+  if (gaze.unreachable) return `out of reach, ${number}`;
   if (gaze.arrived) return `holding, ${number}`;
   return gaze.mode === 'saccade' ? `turning, ${number}` : `following, ${number}`;
+}
+
+/** Beside the arrow that points to it from the picture's edge. */
+export function arrowLabel(gaze: Gaze): string {
+  const { guidanceRad: angle } = gaze;
+  return angle === undefined ? targetLabel(gaze) : `out of reach: wearer, turn ${sideOf(angle)}`;
 }
 
 export const ordinal = (n: number): string => {

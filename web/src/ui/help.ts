@@ -30,7 +30,7 @@ export class Help {
       legend.append(h('li', {}, mark, words));
     };
     for (const [state, sign, words] of LEGEND) explain(FEATURE_CSS[state], sign, words);
-    explain(TARGET_CSS, '⌖', 'what the camera is to look at; its ring is solid once it is held');
+    explain(TARGET_CSS, '◎', 'what the camera is to look at; its ring is solid once it is held');
     const close = h('button', { type: 'button' }, 'Close');
     close.addEventListener('click', () => this.dialog.close());
     this.dialog = h(

@@ -201,7 +201,9 @@ export class Painter {
     ticks();
     this.stroke(TARGET_CSS, 2.5);
     const right = x + r * 1.7;
-    const left = right + 110 * ratio > this.right; // near the edge: on the other side
+    context.font = FONT.replace('13', String(12 * ratio));
+    // Near the edge: on the other side.
+    const left = right + context.measureText(words).width > this.right;
     if (left) context.textAlign = 'right';
     this.words(words, left ? x - r * 1.7 : right, y + r * 1.3, TARGET_CSS);
     context.textAlign = 'left';

@@ -6,7 +6,7 @@ import type { Session } from '../session/session';
 import { pageNowMs } from '../session/clock';
 import { type FrameFacts, isPlaced } from '../session/types';
 import type { AppState } from './app_state';
-import { targetLabel } from './gaze_words';
+import { arrowLabel } from './gaze_words';
 import { Pane } from './pane';
 import type { Player } from './player';
 import { Still } from './still';
@@ -115,7 +115,7 @@ export class VideoPane extends Pane {
     }
     if (gaze && sight?.arrow) {
       this.painter.edgeArrows([sight.arrow], []);
-      this.painter.arrowWords(targetLabel(gaze), sight.arrow);
+      this.painter.arrowWords(arrowLabel(gaze), sight.arrow);
     }
     this.drawTarget(view, sight?.at);
   }

@@ -1,7 +1,9 @@
 import { pageNowMs } from '../session/clock';
+import { hasHead } from '../session/gaze';
 import type { Session } from '../session/session';
 import { h, setClass, setText } from './dom';
 import type { Player } from './player';
+import { WearerHead } from './wearer_head';
 import { presenceWords, statusWords } from './words';
 
 const STALE_MS = 1000;
@@ -14,6 +16,7 @@ export class WearerApp {
   private readonly line = h('p', { class: 'line', role: 'status' }, this.mark, this.words);
   private readonly watchers = h('p', { class: 'watchers' });
   private readonly pauseButton = h('button', { type: 'button', class: 'pause' });
+  private readonly head: WearerHead;
   private readonly fullButton = h('button', { type: 'button', class: 'full' }, 'Full screen');
   private readonly notice = h('p', { class: 'notice', role: 'alert' });
   private paused = false;
@@ -22,6 +25,7 @@ export class WearerApp {
     private readonly session: Session,
     private readonly player: Player,
   ) {
+    this.head = new WearerHead(session);
     this.element = h(
       'div',
       { class: 'wearer-view' },
@@ -29,7 +33,7 @@ export class WearerApp {
       this.line,
       this.watchers,
       this.notice,
-      this.pauseButton,
+      h('div', { class: 'buttons' }, this.head.stop, this.pauseButton, this.head.take),
       this.fullButton,
     );
     this.pauseButton.addEventListener('click', () => this.togglePause());
@@ -37,6 +41,7 @@ export class WearerApp {
     document.addEventListener('keydown', (event) => {
       if (event.key === ' ' && event.target === document.body) this.togglePause();
       if (event.key.toLowerCase() === 'f') this.toggleFull();
+      if (event.key.toLowerCase() === 'x' && !event.repeat) this.head.toggleStop();
     });
   }
 
@@ -77,14 +82,19 @@ export class WearerApp {
     setText(this.watchers, session.live ? watcherWords(session) : '');
     setText(this.pauseButton, paused ? '▶ Go on' : 'Ⅱ Pause picture');
     setText(this.fullButton, document.fullscreenElement ? 'Leave full screen' : 'Full screen');
-    setText(this.notice, noticeWords(player, stale ? age : 0));
+    this.head.update();
+    setText(this.notice, this.head.problem || noticeWords(player, stale ? age : 0));
     setClass(this.element, 'stale', stale);
   }
 }
 
-function watcherWords({ participants }: Session): string {
+function watcherWords({ participants, gaze, sessionId }: Session): string {
   const others = presenceWords(participants.filter(({ role }) => role !== 'wearer'));
-  return others ? `${others} watching` : 'nobody watches';
+  const watching = others ? `${others} watching` : 'nobody watches';
+  if (!hasHead(gaze)) return watching;
+  if (gaze.paused) return `${watching} · head stopped`;
+  if (!gaze.pilot) return watching;
+  return `${watching} · ${gaze.pilot.sessionId === sessionId ? 'you pilot' : `${gaze.pilot.name} pilots`}`;
 }
 
 function noticeWords(player: Player, staleMs: number): string {

@@ -2,13 +2,16 @@
 // simulator's truth about where the camera really looks.
 import { join } from 'node:path';
 import { Expert } from './expert.mjs';
-import { inCamera, inWorld, length, project, times, unproject } from './optics.mjs';
+import { inCamera, inWorld, length, minus, project, times, unproject } from './optics.mjs';
 import { startServer, Truth } from './server.mjs';
 import { createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
-import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
+import { MapService } from '../../src/gen/saccade/v1/map_pb.js';
+import { GazeService } from '../../src/gen/saccade/v1/gaze_pb.js';
+import { Role, SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 
 const LIMIT_DEG = 2;
+const MAPPED_M = 0.05; // in the map one can only click what it shows
 const BORDER_PX = 60; // the click is well inside
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -27,12 +30,16 @@ export async function runGaze({ server: binary, chromium, seed, shots, folder })
   };
   try {
     const transport = createGrpcWebTransport({ baseUrl: server.http });
-    const joined = await createClient(SessionService, transport).join({ displayName: 'test' });
+    context.gaze = createClient(GazeService, transport);
+    context.session = createClient(SessionService, transport);
+    const joined = await context.session.join({ displayName: 'test' });
     context.camera = joined.intrinsics;
+    context.map = createClient(MapService, transport);
     context.truth = new Truth(truthFile);
     context.ann = await Expert.open(chromium, `${server.http}/?name=Ann`);
     await context.ann.waitForStatus(/^tracking/, 60_000);
     await turnAndHold(context);
+    await wearerTakesOver(context);
     await handsChange(context, `${server.http}/?name=Bob`);
     const { errors } = context.ann;
     context.check('page errors', errors.length === 0, errors.join('; ') || 'none');
@@ -143,9 +150,14 @@ async function clickInMap(context) {
   const view = await ann.mapView();
   const eye = { fxPx: view.focal, fyPx: view.focal, cxPx: view.width / 2, cyPx: view.height / 2 };
   const { id } = await ann.look();
+  const { map: now } = await context.map.get({});
+  const mapped = ({ point_in_world_m: at }) =>
+    now.upserted.some(({ depthKnown, pointInWorldM: { x, y, z } }) => {
+      return depthKnown && length(minus([x, y, z], at)) < MAPPED_M;
+    });
   const objects = truth
     .frame(id)
-    .objects.filter(({ visible }) => visible)
+    .objects.filter((object) => object.visible && mapped(object))
     .map((object) => ({ object, away: trueError(context, id, object) }))
     .sort((a, b) => b.away - a.away);
   for (const { object } of objects) {
@@ -157,6 +169,23 @@ async function clickInMap(context) {
     return object;
   }
   return undefined;
+}
+
+/** The wearer takes the head from its pilot and gives it back. */
+async function wearerTakesOver({ ann, session, gaze, check }) {
+  const { sessionId } = await session.join({ displayName: 'Wim', role: Role.WEARER });
+  await gaze.override({ sessionId, enabled: true });
+  const queue = 'Wim pilots · you are 1st in the queue';
+  const waits = await panelWhen(ann.page, ({ steer }) => steer === queue, 2000);
+  await gaze.override({ sessionId, enabled: false });
+  const back = await panelWhen(ann.page, ({ steer }) => steer === 'you pilot', 2000);
+  await sleep(700); // longer than the server waits for a heartbeat
+  const { steer } = await panelOf(ann.page);
+  check(
+    'the wearer takes over; given back, the pilot has it again and keeps it',
+    waits.ok && back.ok && steer === 'you pilot',
+    `"${waits.panel.steer}", then "${steer}"`,
+  );
 }
 
 /** Another expert sees who pilots, waits, and has the head; it stops; and rests when he is gone. */

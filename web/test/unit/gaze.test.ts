@@ -169,6 +169,7 @@ describe('GazePilot', () => {
     tell({ kind: 'refused', reason: 'no longer in force' });
     await settle();
     expect(pilot.lease).toEqual({ kind: 'waiting', position: 1, pilot: 'wearer' });
+    expect(pilot.lost).toBe('');
     expect(calls.at(-1)).toBe('keep ');
   });
 
@@ -238,7 +239,9 @@ describe('words of the gaze', () => {
       panRad: 170 * DEGREE,
       guidanceRad: Math.PI,
     });
-    expect(far.advice).toContain('by 23.0 deg; this is as near as they can look (170 deg right)');
+    expect(far.advice).toContain(
+      'misses it by 23.0 deg: this is as near as it can look (170 deg right)',
+    );
     expect(far.advice).toContain('turn left');
     expect(say({ mode: GazeMode.FIXATE, targetLost: true }).advice).toContain('Target lost');
     expect(say({ mode: GazeMode.STOPPED, problem: 'the mount is silent' })).toMatchObject({
