@@ -28,9 +28,10 @@ Matrix12d StartCovariance() {
   return sigma.cwiseAbs2().asDiagonal();
 }
 
-FilterOptions OptionsOf(PointsMode mode) {
+FilterOptions OptionsOf(const PointsOptions& points, PointsMode mode) {
   FilterOptions options;
   options.fej = mode == PointsMode::kSlamFej;
+  if (points.range_only) options.form = PointForm::kRangeOnly;
   return options;
 }
 
@@ -44,7 +45,7 @@ PointsFilter::PointsFilter(const PointsWorld& world, const PointsOptions& option
     : world_(world),
       options_(options),
       mode_(mode),
-      filter_(OptionsOf(mode)),
+      filter_(OptionsOf(options, mode)),
       id_of_point_(world.points.size(), 0) {
   std::mt19937_64 rng(options.seed ^ 0x5acadeULL);
   std::normal_distribution<double> normal;
@@ -194,6 +195,8 @@ absl::StatusOr<PointsStep> PointsFilter::Step(std::size_t index) {
         absl::StrCat("frame ", index, ": the pose covariance is not positive definite"));
   }
   step.nees = error.head<6>().dot(covariance.solve(error.head<6>()));
+  const Eigen::Matrix3d of_position = filter_.PoseCovariance().topLeftCorner<3, 3>();
+  step.position_nees = error.head<3>().dot(of_position.ldlt().solve(error.head<3>()));
   step.position_error_m = error.head<3>().norm();
   step.rotation_error_rad = error.segment<3>(3).norm();
   return step;

@@ -23,8 +23,9 @@ enum class PointsMode {
 
 /// What one frame did to the filter, against the truth.
 struct PointsStep {
-  double nees = 0;  // of the 6-D pose
-  double nis = 0;   // of all matches together: chi-square with 2 * matches degrees of freedom
+  double nees = 0;           // of the 6-D pose
+  double position_nees = 0;  // of its 3-D position
+  double nis = 0;  // of all matches together: chi-square with 2 * matches degrees of freedom
   int matches = 0;
   double position_error_m = 0;
   double rotation_error_rad = 0;

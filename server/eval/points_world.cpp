@@ -5,16 +5,12 @@
 #include <random>
 
 namespace saccade {
-namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-const Vector3d kHalfRoom_m(2.0, 1.25, 2.0);
-constexpr double kMinDepth_m = 0.3;
-
 /// Draws, in an order that does not depend on the standard library: normal_distribution may.
-class Draw {
+class PointsWalk::Draw {
  public:
   explicit Draw(std::uint64_t seed) : rng_(seed) {}
   double Uniform(double low, double high) {
@@ -33,6 +29,11 @@ class Draw {
   std::mt19937_64 rng_;
 };
 
+namespace {
+
+const Vector3d kHalfRoom_m(2.0, 1.25, 2.0);
+constexpr double kMinDepth_m = 0.3;
+
 CameraModel RoomCamera(double fps) {
   CameraIntrinsics camera;
   camera.model = LensModel::kBrownConrady;
@@ -47,6 +48,7 @@ CameraModel RoomCamera(double fps) {
 }
 
 /// Four in five points lie on walls, floor and ceiling, the rest on things in the room.
+template <typename Draw>
 Vector3d RandomPoint(Draw& draw) {
   const Vector3d unit(draw.Uniform(-1, 1), draw.Uniform(-1, 1), draw.Uniform(-1, 1));
   Vector3d point = unit.cwiseProduct(kHalfRoom_m);
@@ -68,6 +70,7 @@ Vector3d TargetPoint(int i, int count) {
 
 /// One step of the agile model M1 (slam-spec section 3), drawn back to the middle of the room and
 /// to where the wearer means to look: weakly beside the model's noise.
+template <typename Draw>
 void Move(Draw& draw, const PointsOptions& options, double time_s, double dt, PointsFrame& state) {
   constexpr double kSpring = 0.6, kDamping = 1.2;          // of position [1/s^2, 1/s]
   constexpr double kTurnSpring = 6.0, kTurnDamping = 5.0;  // of direction
@@ -85,11 +88,12 @@ void Move(Draw& draw, const PointsOptions& options, double time_s, double dt, Po
           .normalized();
 }
 
-void Observe(Draw& draw, const PointsOptions& options, const PointsWorld& world,
+template <typename Draw>
+void Observe(Draw& draw, const PointsOptions& options, const PointsWorld& world, double time_s,
              PointsFrame& frame) {
   const Rigid3 camera_from_world = frame.world_from_camera.Inverse();
   for (int i = 0; i < static_cast<int>(world.points.size()); ++i) {
-    const Vector3d point = camera_from_world * world.points[static_cast<std::size_t>(i)];
+    const Vector3d point = camera_from_world * PointAt(world, options, i, time_s);
     if (point.z() < kMinDepth_m) continue;
     const auto exact = world.camera.Project(point);
     if (!exact || !world.camera.InImage(*exact)) continue;
@@ -98,25 +102,52 @@ void Observe(Draw& draw, const PointsOptions& options, const PointsWorld& world,
   }
 }
 
+/// Somebody about half a metre wide who stands before the wearer.
+template <typename Draw>
+Vector3d PersonPoint(Draw& draw) {
+  return {draw.Uniform(-0.25, 0.25), draw.Uniform(-0.3, 0.4), draw.Uniform(1.3, 1.4)};
+}
+
 }  // namespace
 
-PointsWorld MakePointsWorld(const PointsOptions& options) {
-  Draw draw(options.seed);
-  PointsWorld world;
-  world.camera = RoomCamera(options.fps);
-  world.dt_s = 1.0 / options.fps;
+Vector3d PointAt(const PointsWorld& world, const PointsOptions& options, int i, double time_s) {
+  constexpr double kSpan_m = 0.8, kPeriod_s = 6.0;  // to and fro at up to 0.84 m/s
+  Vector3d point = world.points[static_cast<std::size_t>(i)];
+  const double since = time_s - options.moving_from_s;
+  if (i >= options.points - options.moving_points && since > 0.0) {
+    point.x() += kSpan_m * std::sin(2.0 * std::numbers::pi * since / kPeriod_s);
+  }
+  return point;
+}
+
+PointsWalk::PointsWalk(const PointsOptions& options)
+    : options_(options), draw_(std::make_unique<Draw>(options.seed)) {
+  world_.camera = RoomCamera(options.fps);
+  world_.dt_s = 1.0 / options.fps;
   for (int i = 0; i < options.points; ++i) {
-    world.points.push_back(i < options.target_points ? TargetPoint(i, options.target_points)
-                                                     : RandomPoint(draw));
+    const bool moves = i >= options.points - options.moving_points;
+    world_.points.push_back(i < options.target_points ? TargetPoint(i, options.target_points)
+                            : moves                   ? PersonPoint(*draw_)
+                                                      : RandomPoint(*draw_));
   }
+}
+
+PointsWalk::~PointsWalk() = default;
+
+const PointsFrame& PointsWalk::Next() {
+  const double time_s = next_ * world_.dt_s;
+  if (next_ > 0) Move(*draw_, options_, time_s, world_.dt_s, state_);
+  state_.observations.clear();
+  Observe(*draw_, options_, world_, time_s, state_);
+  ++next_;
+  return state_;
+}
+
+PointsWorld MakePointsWorld(const PointsOptions& options) {
+  PointsWalk walk(options);
+  PointsWorld world = walk.world();
   const int count = static_cast<int>(std::lround(options.duration_s * options.fps));
-  PointsFrame state;
-  for (int k = 0; k < count; ++k) {
-    if (k > 0) Move(draw, options, k * world.dt_s, world.dt_s, state);
-    state.observations.clear();
-    Observe(draw, options, world, state);
-    world.frames.push_back(state);
-  }
+  for (int k = 0; k < count; ++k) world.frames.push_back(walk.Next());
   return world;
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "shared/camera/camera_model.hpp"
@@ -27,6 +28,12 @@ struct PointsOptions {
   /// Matches are weighted by the robust pose, as the tracker does. Off: NIS is an honest
   /// chi-square.
   bool soft_gate = false;
+  /// Features by inverse range alone, bearings frozen at birth (ESID).
+  bool range_only = false;
+  /// The last of the points stand together on something that starts to move about at this time
+  /// [s]: somebody in the room (T16).
+  int moving_points = 0;
+  double moving_from_s = 20.0;
 };
 
 struct PointObservation {
@@ -53,5 +60,28 @@ struct PointsWorld {
 
 /// The same options give the same world.
 PointsWorld MakePointsWorld(const PointsOptions& options);
+
+/// The same world frame by frame, for runs that are too long to be held.
+class PointsWalk {
+ public:
+  explicit PointsWalk(const PointsOptions& options);
+  ~PointsWalk();
+  /// Without frames.
+  const PointsWorld& world() const { return world_; }
+  /// The next frame; valid until the call after.
+  const PointsFrame& Next();
+
+ private:
+  class Draw;
+  PointsOptions options_;
+  std::unique_ptr<Draw> draw_;
+  PointsWorld world_;
+  PointsFrame state_;
+  int next_ = 0;
+};
+
+/// Where point `i` is at `time_s` [m, world].
+Eigen::Vector3d PointAt(const PointsWorld& world, const PointsOptions& options, int i,
+                        double time_s);
 
 }  // namespace saccade

@@ -5,9 +5,11 @@
 #include <iostream>
 
 #include "server/eval/commands.hpp"
+#include "server/eval/forms_scenario.hpp"
 #include "server/eval/gaze_scenario.hpp"
 #include "server/eval/pixel_run.hpp"
 #include "server/eval/points_scenario.hpp"
+#include "server/eval/soak_scenario.hpp"
 
 namespace saccade {
 namespace {
@@ -18,7 +20,7 @@ struct PixelScenario {
   absl::string_view name;
   SimMotion motion;
 };
-/// Scenarios through pixels; `points` is the one at feature level.
+/// Scenarios through pixels; `points`, `forms` and `soak` are at feature level.
 constexpr PixelScenario kPixelScenarios[] = {
     {"desk", SimMotion::kDesk}, {"sway", SimMotion::kSway},   {"walk", SimMotion::kWalk},
     {"turn", SimMotion::kTurn}, {"still", SimMotion::kStill},
@@ -105,7 +107,7 @@ std::string Table(const Json& report) {
 }  // namespace
 
 std::string ScenarioNames() {
-  std::string names = "points";
+  std::string names = "points, forms, soak";
   for (const PixelScenario& each : kPixelScenarios) absl::StrAppend(&names, ", ", each.name);
   absl::StrAppend(&names, ", ", GazeScenarioNames());
   return names;
@@ -113,10 +115,14 @@ std::string ScenarioNames() {
 
 absl::Status SimCommand(const SimArguments& asked) {
   SimArguments arguments = asked;
-  if (arguments.duration_s <= 0 && !IsGazeScenario(arguments.scenario)) arguments.duration_s = 60;
+  if (arguments.duration_s <= 0 && !IsGazeScenario(arguments.scenario)) {
+    arguments.duration_s = arguments.scenario == "soak" ? 610 : 60;
+  }
   absl::StatusOr<Json> report = absl::InvalidArgumentError(absl::StrCat(
       "--scenario '", arguments.scenario, "' is unknown; use one of ", ScenarioNames()));
   if (arguments.scenario == "points") report = RunPointsScenario(arguments);
+  if (arguments.scenario == "forms") report = RunFormsScenario(arguments);
+  if (arguments.scenario == "soak") report = RunSoakScenario(arguments);
   if (IsGazeScenario(arguments.scenario)) report = RunGazeScenario(arguments);
   for (const PixelScenario& each : kPixelScenarios) {
     if (each.name == arguments.scenario) report = RunPixels(arguments, each.motion);

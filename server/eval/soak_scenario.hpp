@@ -1,0 +1,34 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <nlohmann/json.hpp>
+
+#include "server/eval/commands.hpp"
+#include "server/eval/points_world.hpp"
+
+namespace saccade {
+
+/// What one long run came to.
+struct SoakResult {
+  double early_rmse_m = 0;  // of the position, from 10 to 20 s
+  double late_rmse_m = 0;   // over the last 10 s
+  double worst_m = 0;       // after the first 10 s
+  std::size_t most_features = 0, most_states = 0;
+  /// Least eigenvalue of P over its trace, at the worst of the checks (T5: above -1e-12).
+  double least_eigenvalue_over_trace = 0;
+  double memory_early_mb = 0,
+         memory_late_mb = 0;  // resident, after a tenth of the run and at its end
+  int moving_features = 0;    // that lived on the moving thing once it moved
+  int slow_features = 0;      // of those, kept for more than 2 s after
+  double slowest_s = 0;       // the longest such stay
+};
+
+/// One run of PointsTracker over options.duration_s. An error is the filter's own, with the time.
+absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options);
+
+/// T16, T41 and T45 at feature level: runs of any length with the tracker's rules for its map;
+/// something in the room starts to move.
+absl::StatusOr<nlohmann::ordered_json> RunSoakScenario(const SimArguments& arguments);
+
+}  // namespace saccade

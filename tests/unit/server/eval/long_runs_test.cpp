@@ -1,0 +1,105 @@
+// T14, T16, T41 and T45 in small; `saccade-eval sim --scenario forms|soak` is the whole of them.
+#include <gtest/gtest.h>
+
+#include "server/eval/points_filter.hpp"
+#include "server/eval/soak_scenario.hpp"
+#include "server/eval/xyz_filter.hpp"
+
+namespace saccade {
+namespace {
+
+/// Mean position NEES over a run; 3 is ideal.
+template <typename Filter>
+double PositionNees(Filter& filter, std::size_t frames) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < frames; ++i) {
+    const auto step = filter.Step(i);
+    EXPECT_TRUE(step.ok()) << step.status();
+    if (!step.ok()) return 1e9;
+    sum += step->position_nees;
+  }
+  return sum / static_cast<double>(frames);
+}
+
+TEST(Forms, BearingAndRangeIsAsConsistentAsPointsT14) {
+  double xyz = 0.0, sid = 0.0, esid = 0.0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    PointsOptions options;
+    options.seed = seed;
+    options.duration_s = 15;
+    const PointsWorld world = MakePointsWorld(options);
+    XyzFilter reference(world, options);
+    PointsFilter bearing_range(world, options, PointsMode::kSlam);
+    options.range_only = true;
+    PointsFilter range_only(world, options, PointsMode::kSlam);
+    xyz += PositionNees(reference, world.frames.size());
+    sid += PositionNees(bearing_range, world.frames.size());
+    esid += PositionNees(range_only, world.frames.size());
+  }
+  std::printf("T14: position NEES xyz %.2f, SID %.2f, ESID %.2f (3 is ideal)\n", xyz / 5, sid / 5,
+              esid / 5);
+  EXPECT_LT(sid, 1.2 * xyz);
+  EXPECT_LT(esid, 2.0 * xyz);
+}
+
+TEST(Forms, TheReferenceIsConsistentWhereDepthsAreNotInPlay) {
+  // Nothing but the target's six points: an ordinary localisation.
+  PointsOptions options;
+  options.duration_s = 5;
+  options.points = options.target_points = 60;
+  const PointsWorld world = MakePointsWorld(options);
+  XyzFilter reference(world, options);
+  const double nees = PositionNees(reference, world.frames.size());
+  EXPECT_GT(nees, 2.0);
+  EXPECT_LT(nees, 4.2);
+}
+
+TEST(Soak, LocalisesAsWellLaterAndKeepsItsMapBoundedT16T41T45) {
+  PointsOptions options;
+  options.duration_s = 60;
+  options.moving_points = 10;
+  const auto result = RunSoak(options);
+  ASSERT_TRUE(result.ok()) << result.status();
+  std::printf(
+      "soak: RMSE %.2f mm from 10 to 20 s, %.2f mm at the end, %zu features, %d on what moves, "
+      "%d of them kept over 2 s (longest %.2f s)\n",
+      1e3 * result->early_rmse_m, 1e3 * result->late_rmse_m, result->most_features,
+      result->moving_features, result->slow_features, result->slowest_s);
+  EXPECT_GT(result->early_rmse_m, 0.0);
+  EXPECT_LE(result->late_rmse_m, 1.5 * result->early_rmse_m);
+  EXPECT_LE(result->late_rmse_m, 0.02);
+  EXPECT_LE(result->most_features, 115U);
+  EXPECT_GE(result->least_eigenvalue_over_trace, -1e-12);
+  EXPECT_LT(result->memory_late_mb - result->memory_early_mb, 10.0);
+  EXPECT_GE(result->moving_features, 10);
+  EXPECT_LE(result->slow_features, result->moving_features / 50);
+}
+
+TEST(Soak, SameSeedSameResult) {
+  PointsOptions options;
+  options.duration_s = 21;
+  const auto a = RunSoak(options), b = RunSoak(options);
+  ASSERT_TRUE(a.ok() && b.ok());
+  EXPECT_EQ(a->late_rmse_m, b->late_rmse_m);
+}
+
+TEST(PointsWalk, IsTheWorldFrameByFrame) {
+  PointsOptions options;
+  options.duration_s = 2;
+  options.moving_points = 5;
+  options.moving_from_s = 1.0;
+  const PointsWorld world = MakePointsWorld(options);
+  PointsWalk walk(options);
+  for (const PointsFrame& frame : world.frames) {
+    const PointsFrame& next = walk.Next();
+    ASSERT_EQ(next.world_from_camera.translation, frame.world_from_camera.translation);
+    ASSERT_EQ(next.observations.size(), frame.observations.size());
+  }
+  const int last = options.points - 1;
+  EXPECT_EQ(PointAt(world, options, last, 0.9), world.points[last]);
+  EXPECT_GT((PointAt(world, options, last, 1.5) - world.points[last]).norm(), 0.2);
+  EXPECT_EQ(PointAt(world, options, last - 5, 1.5), world.points[last - 5]);
+}
+
+}  // namespace
+}  // namespace saccade
