@@ -7,21 +7,27 @@ export class AnnotationBook {
   private readonly known = new Map<string, Annotation>();
   private readonly pending = new Map<string, PendingAnnotation>();
   private readonly leaving = new Set<string>();
+  private readonly gone = new Set<string>();
   /** Rises with every change. */
   version = 0;
 
   apply(event: AnnotationEvent): void {
     if (event.full) this.known.clear();
-    for (const pb of event.upserted) this.known.set(pb.id, toAnnotation(pb));
+    for (const pb of event.upserted) {
+      this.known.set(pb.id, toAnnotation(pb));
+      this.gone.delete(pb.id);
+    }
     for (const id of event.removedIds) {
       this.known.delete(id);
+      this.gone.add(id);
       this.leaving.delete(id);
     }
     ++this.version;
   }
 
-  /** The answer to a request of ours, usually ahead of the stream's. */
+  /** The answer to a request of ours, usually ahead of the stream's; late, it may be gone by then. */
   put(annotation: Annotation): void {
+    if (this.gone.has(annotation.id)) return;
     this.known.set(annotation.id, annotation);
     ++this.version;
   }

@@ -189,6 +189,18 @@ describe('AnnotationBook', () => {
     expect(book.list().map(({ id }) => id)).toEqual(['a', 'b']);
   });
 
+  it('takes no late answer for what has been undone, unless it is redone', () => {
+    const book = new AnnotationBook();
+    book.apply(event(true, 'a'));
+    const answer = book.get('a')!;
+    book.apply(create(AnnotationEventSchema, { removedIds: ['a'] }));
+    book.put(answer);
+    expect(book.list()).toEqual([]);
+    book.apply(event(false, 'a'));
+    book.put(answer);
+    expect(book.list()).toHaveLength(1);
+  });
+
   it('forgets what a full list does not have', () => {
     const book = new AnnotationBook();
     book.apply(event(true, 'a', 'b'));
