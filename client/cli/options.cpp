@@ -1,5 +1,7 @@
 #include "client/cli/options.hpp"
 
+#include <absl/algorithm/container.h>
+#include <absl/strings/ascii.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
@@ -18,7 +20,7 @@ struct Raw {
   double timeout_s = 5;
   std::string view = "raw";
   std::string shape = "cube";
-  std::string pixel, point, stroke;
+  std::string pixel, point, stroke, color;
   std::optional<std::uint64_t> feature;
   std::string annotation;  // fixate
 };
@@ -41,6 +43,17 @@ absl::StatusOr<std::vector<double>> ParseList(absl::string_view text) {
     numbers.push_back(number);
   }
   return numbers;
+}
+
+// RRGGBB, as on the page, to 0xRRGGBBff.
+absl::StatusOr<std::uint32_t> ParseColor(absl::string_view text) {
+  std::uint32_t rgb = 0;
+  if (text.size() != 6 || !absl::c_all_of(text, absl::ascii_isxdigit) ||
+      !absl::SimpleHexAtoi(text, &rgb)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("'", text, "' is not a colour: RRGGBB, for example ff9a3d"));
+  }
+  return (rgb << 8) | 0xffu;
 }
 
 // A validator that leaves the text as it is.
@@ -105,6 +118,8 @@ void AddAnnotate(CLI::App& app, Options& options, Raw& raw) {
   annotate->add_option("--size", options.draft.size_m, "Size [m]")
       ->check(CLI::Range(0.001, 10.0))
       ->capture_default_str();
+  annotate->add_option("--color", raw.color, "RRGGBB, for example ff9a3d (else white)")
+      ->check(Checked(ParseColor, "RRGGBB"));
   annotate->add_option("--stroke", raw.stroke, "U1,V1,U2,V2,... of an ink shape, with --pixel")
       ->needs(pixel)
       ->check(Checked(ParseStroke, "U1,V1,U2,V2,..."));
@@ -185,6 +200,7 @@ absl::Status FinishDraft(const Raw& raw, AnnotationDraft& draft) {
     return absl::InvalidArgumentError(ink ? "--shape ink needs --stroke U1,V1,U2,V2,..."
                                           : "--stroke is for --shape ink only");
   }
+  if (!raw.color.empty()) draft.color_rgba = *ParseColor(raw.color);
   if (ink) draft.ink_px = *ParseStroke(raw.stroke);
   return absl::OkStatus();
 }

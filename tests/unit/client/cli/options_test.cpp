@@ -43,6 +43,9 @@ TEST(CommandLine, BadUsageEndsWithTwo) {
       {"annotate", "--pixel", "1,2", "--shape", "ink"},
       {"annotate", "--pixel", "1,2", "--stroke", "1,2,3,4"},
       {"annotate", "--pixel", "1,2", "--size", "11"},
+      {"annotate", "--pixel", "1,2", "--color", "orange"},
+      {"annotate", "--pixel", "1,2", "--color", "0xff00"},
+      {"annotate", "--pixel", "1,2", "--color", "ff9a3dff"},
       {"snapshot", "--view", "raw"},
       {"snapshot", "--view", "rgb", "--out", "a.png"},
       {"annotations", "show"},
@@ -83,6 +86,15 @@ TEST(CommandLine, TargetsOfAnAnnotationAreTaken) {
   ASSERT_TRUE(ink.options);
   ASSERT_EQ(ink.options->draft.ink_px.size(), 2u);
   EXPECT_EQ(ink.options->draft.ink_px[1], Eigen::Vector2d(3, 4.5));
+}
+
+TEST(CommandLine, AnAnnotationHasTheColourAskedFor) {
+  const ParseResult white = Parse({"annotate", "--pixel", "1,2"});
+  ASSERT_TRUE(white.options);
+  EXPECT_EQ(white.options->draft.color_rgba, 0xffffffffu);
+  const ParseResult orange = Parse({"annotate", "--pixel", "1,2", "--color", "FF9a3d"});
+  ASSERT_TRUE(orange.options);
+  EXPECT_EQ(orange.options->draft.color_rgba, 0xff9a3dffu);
 }
 
 TEST(CommandLine, OptionsOfTheProgramMayFollowTheCommand) {
