@@ -32,6 +32,7 @@ struct SimArguments {
   std::filesystem::path out;
   double duration_s = 0;  // 0: the scenario's own
   TrackerArguments tracker;
+  std::vector<std::filesystem::path> foreign;  // recordings of other places, for `reloc`
   bool json = false;
 };
 struct RenderArguments {

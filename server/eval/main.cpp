@@ -61,6 +61,10 @@ void AddSim(CLI::App& app, SimArguments& arguments) {
   sim->add_option("--set", arguments.tracker.set,
                   "One tracker option as key=value; may be repeated")
       ->take_all();
+  sim->add_option("--foreign", arguments.foreign,
+                  "reloc: recording of another place, where nothing may be recognised; may be "
+                  "repeated")
+      ->take_all();
   sim->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
 }
 

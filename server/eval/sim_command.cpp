@@ -9,6 +9,7 @@
 #include "server/eval/gaze_scenario.hpp"
 #include "server/eval/pixel_run.hpp"
 #include "server/eval/points_scenario.hpp"
+#include "server/eval/reloc_scenario.hpp"
 #include "server/eval/soak_scenario.hpp"
 
 namespace saccade {
@@ -107,7 +108,7 @@ std::string Table(const Json& report) {
 }  // namespace
 
 std::string ScenarioNames() {
-  std::string names = "points, forms, soak";
+  std::string names = "points, forms, soak, reloc";
   for (const PixelScenario& each : kPixelScenarios) absl::StrAppend(&names, ", ", each.name);
   absl::StrAppend(&names, ", ", GazeScenarioNames());
   return names;
@@ -116,13 +117,16 @@ std::string ScenarioNames() {
 absl::Status SimCommand(const SimArguments& asked) {
   SimArguments arguments = asked;
   if (arguments.duration_s <= 0 && !IsGazeScenario(arguments.scenario)) {
-    arguments.duration_s = arguments.scenario == "soak" ? 610 : 60;
+    arguments.duration_s = arguments.scenario == "soak"    ? 610
+                           : arguments.scenario == "reloc" ? 30
+                                                           : 60;
   }
   absl::StatusOr<Json> report = absl::InvalidArgumentError(absl::StrCat(
       "--scenario '", arguments.scenario, "' is unknown; use one of ", ScenarioNames()));
   if (arguments.scenario == "points") report = RunPointsScenario(arguments);
   if (arguments.scenario == "forms") report = RunFormsScenario(arguments);
   if (arguments.scenario == "soak") report = RunSoakScenario(arguments);
+  if (arguments.scenario == "reloc") report = RunRelocScenario(arguments);
   if (IsGazeScenario(arguments.scenario)) report = RunGazeScenario(arguments);
   for (const PixelScenario& each : kPixelScenarios) {
     if (each.name == arguments.scenario) report = RunPixels(arguments, each.motion);

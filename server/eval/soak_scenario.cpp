@@ -12,6 +12,7 @@
 
 #include "server/eval/output_file.hpp"
 #include "server/eval/points_tracker.hpp"
+#include "server/eval/registration.hpp"
 #include "server/eval/statistics.hpp"
 #include "shared/time/timestamp.hpp"
 
@@ -93,6 +94,9 @@ absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options) {
     if (time_s >= kEarlyFrom_s && time_s < kEarlyTo_s) early.Add(squared);
     if (time_s >= options.duration_s - kLate_s) late.Add(squared);
     if (time_s >= kEarlyFrom_s) result.worst_m = std::max(result.worst_m, step->position_error_m);
+    const bool lost =
+        step->position_error_m > kLostPosition_m || step->rotation_error_rad > kLostRotation_rad;
+    if (lost && result.lost_at_s < 0) result.lost_at_s = time_s;
     result.most_features = std::max(result.most_features, tracker.filter().feature_count());
     result.most_states =
         std::max(result.most_states, static_cast<std::size_t>(tracker.filter().dim()));
@@ -113,12 +117,12 @@ absl::StatusOr<Json> RunSoakScenario(const SimArguments& arguments) {
   if (const absl::Status status = CreateFolder(arguments.out); !status.ok()) return status;
   PointsOptions options;
   options.duration_s = arguments.duration_s;
-  options.moving_points = kMovingPoints;
+  options.moving_points = getenv("NOMOVE") ? 0 : kMovingPoints;
   Json runs = Json::array();
   Sample early, late, ratio, worst, slowest;
   double least = 0.0, growth_mb = 0.0;
   std::size_t features = 0, states = 0;
-  int moving = 0, slow = 0, failed = 0;
+  int moving = 0, slow = 0, failed = 0, lost = 0;
   for (int run = 0; run < arguments.runs; ++run) {
     options.seed = arguments.seed + static_cast<std::uint64_t>(run);
     const Timestamp begin = MonotonicNow();
@@ -135,6 +139,7 @@ absl::StatusOr<Json> RunSoakScenario(const SimArguments& arguments) {
                     {"early_rmse_m", result->early_rmse_m},
                     {"late_rmse_m", result->late_rmse_m},
                     {"worst_m", result->worst_m},
+                    {"lost_at_s", result->lost_at_s},
                     {"most_features", result->most_features},
                     {"slowest_moving_feature_s", result->slowest_s}});
     early.Add(result->early_rmse_m * result->early_rmse_m);
@@ -146,6 +151,7 @@ absl::StatusOr<Json> RunSoakScenario(const SimArguments& arguments) {
     growth_mb = std::max(growth_mb, result->memory_late_mb - result->memory_early_mb);
     features = std::max(features, result->most_features);
     states = std::max(states, result->most_states);
+    lost += result->lost_at_s >= 0 ? 1 : 0;
     moving += result->moving_features;
     slow += result->slow_features;
   }
@@ -155,6 +161,7 @@ absl::StatusOr<Json> RunSoakScenario(const SimArguments& arguments) {
   report["duration_s"] = arguments.duration_s;
   report["runs"] = arguments.runs;
   report["broken_runs"] = failed;
+  report["lost_runs"] = lost;
   report["early_rmse_m"] = std::sqrt(early.Mean());
   report["late_rmse_m"] = std::sqrt(late.Mean());
   report["late_over_early"] = std::sqrt(late.Mean() / early.Mean());

@@ -14,6 +14,7 @@ struct SoakResult {
   double early_rmse_m = 0;  // of the position, from 10 to 20 s
   double late_rmse_m = 0;   // over the last 10 s
   double worst_m = 0;       // after the first 10 s
+  double lost_at_s = -1;    // first moment more than 10 cm or 5 deg from the truth; -1: never
   std::size_t most_features = 0, most_states = 0;
   /// Least eigenvalue of P over its trace, at the worst of the checks (T5: above -1e-12).
   double least_eigenvalue_over_trace = 0;
