@@ -105,10 +105,15 @@ std::string Table(const Json& report) {
   return text;
 }
 
+double DefaultDuration_s(absl::string_view scenario) {
+  if (scenario == "soak" || scenario == "passerby") return 610;
+  return scenario == "reloc" ? 30 : 60;
+}
+
 }  // namespace
 
 std::string ScenarioNames() {
-  std::string names = "points, forms, soak, reloc";
+  std::string names = "points, forms, soak, passerby, reloc";
   for (const PixelScenario& each : kPixelScenarios) absl::StrAppend(&names, ", ", each.name);
   absl::StrAppend(&names, ", ", GazeScenarioNames());
   return names;
@@ -117,15 +122,15 @@ std::string ScenarioNames() {
 absl::Status SimCommand(const SimArguments& asked) {
   SimArguments arguments = asked;
   if (arguments.duration_s <= 0 && !IsGazeScenario(arguments.scenario)) {
-    arguments.duration_s = arguments.scenario == "soak"    ? 610
-                           : arguments.scenario == "reloc" ? 30
-                                                           : 60;
+    arguments.duration_s = DefaultDuration_s(arguments.scenario);
   }
   absl::StatusOr<Json> report = absl::InvalidArgumentError(absl::StrCat(
       "--scenario '", arguments.scenario, "' is unknown; use one of ", ScenarioNames()));
   if (arguments.scenario == "points") report = RunPointsScenario(arguments);
   if (arguments.scenario == "forms") report = RunFormsScenario(arguments);
-  if (arguments.scenario == "soak") report = RunSoakScenario(arguments);
+  if (arguments.scenario == "soak" || arguments.scenario == "passerby") {
+    report = RunSoakScenario(arguments);
+  }
   if (arguments.scenario == "reloc") report = RunRelocScenario(arguments);
   if (IsGazeScenario(arguments.scenario)) report = RunGazeScenario(arguments);
   for (const PixelScenario& each : kPixelScenarios) {

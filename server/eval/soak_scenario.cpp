@@ -117,7 +117,7 @@ absl::StatusOr<Json> RunSoakScenario(const SimArguments& arguments) {
   if (const absl::Status status = CreateFolder(arguments.out); !status.ok()) return status;
   PointsOptions options;
   options.duration_s = arguments.duration_s;
-  options.moving_points = getenv("NOMOVE") ? 0 : kMovingPoints;
+  options.moving_points = arguments.scenario == "passerby" ? kMovingPoints : 0;
   Json runs = Json::array();
   Sample early, late, ratio, worst, slowest;
   double least = 0.0, growth_mb = 0.0;
@@ -156,7 +156,7 @@ absl::StatusOr<Json> RunSoakScenario(const SimArguments& arguments) {
     slow += result->slow_features;
   }
   Json report;
-  report["scenario"] = "soak";
+  report["scenario"] = arguments.scenario;
   report["seed"] = arguments.seed;
   report["duration_s"] = arguments.duration_s;
   report["runs"] = arguments.runs;

@@ -28,8 +28,9 @@ struct SoakResult {
 /// One run of PointsTracker over options.duration_s. An error is the filter's own, with the time.
 absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options);
 
-/// T16, T41 and T45 at feature level: runs of any length with the tracker's rules for its map;
-/// something in the room starts to move.
+/// `soak` (T41, T45) and `passerby` (T16) at feature level: runs of any length with the tracker's
+/// rules for its map. In `passerby` somebody who stood before the wearer walks to and fro from 20 s
+/// on. Nothing here notices that it is lost, nor finds back: what diverges stays so.
 absl::StatusOr<nlohmann::ordered_json> RunSoakScenario(const SimArguments& arguments);
 
 }  // namespace saccade
