@@ -70,8 +70,12 @@ export class GazePilot {
 
   /** To be called now and then: a lease belongs to its session. */
   check(): void {
-    if (this.lease.kind === 'none' || this.owner === this.session.sessionId) return;
-    void this.end('The connection was lost, and the lease with it.');
+    const { clients, sessionId } = this.session;
+    const { owner } = this;
+    if (this.lease.kind === 'none' || owner === sessionId) return;
+    void this.end('A new session has begun; the lease ended with the old one.');
+    // After a new name the old session is still known: then the head need not wait for silence.
+    clients.gaze.releaseLease({ sessionId: owner }, TIMEOUT).catch(() => undefined);
   }
 
   async fixate(target: GazeTarget, fast: boolean): Promise<void> {
@@ -158,7 +162,7 @@ export class GazePilot {
   /** The lease is somebody else's. Whom the wearer took it from is first in the queue, and stays. */
   private async dropped(reason: string): Promise<void> {
     const sessionId = this.owner;
-    void this.end(reason);
+    void this.end(`You pilot no longer: ${reason}.`);
     const { version } = this;
     let state: GazeState | undefined;
     try {

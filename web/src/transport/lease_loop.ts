@@ -1,6 +1,5 @@
 import { Code, ConnectError } from '@connectrpc/connect';
 import type { AcquireLeaseResponse } from '../gen/saccade/v1/gaze_pb';
-import { plainWords } from './errors';
 
 /** What comes back of asking for the lease again and again. */
 export type LeaseTold =
@@ -79,7 +78,11 @@ export class LeaseLoop {
   private failed(error: unknown): void {
     if (this.over || mayPass(error)) return;
     this.over = true;
-    this.told({ kind: 'refused', reason: plainWords(error) });
+    const { code } = ConnectError.from(error);
+    // Not that: then it is the session that the server does not know any more.
+    const passedOn = code === Code.FailedPrecondition || code === Code.PermissionDenied;
+    const reason = passedOn ? 'the lease has ended' : 'the connection was lost';
+    this.told({ kind: 'refused', reason });
   }
 }
 

@@ -61,12 +61,12 @@ export class GazePanel {
 
   update(): void {
     const { session, pilot, state } = this;
-    const { gaze } = session;
+    const head = hasHead(session.gaze);
+    const gaze = session.live ? session.gaze : undefined;
     const target = gaze?.target;
     const annotation =
       target?.kind === 'annotation' ? session.annotations.get(target.annotationId) : undefined;
     const words = gazeWords({ gaze, annotation });
-    const head = hasHead(gaze);
     setText(this.mark, words.mark);
     setText(this.text, words.text);
     setText(this.number, words.number);
@@ -75,10 +75,12 @@ export class GazePanel {
     setClass(this.element, 'fixed', !head);
     this.element.dataset['mode'] = gaze?.mode ?? ''; // for tests
     this.element.dataset['arrived'] = String(gaze?.arrived ?? false);
-    this.dial.update(head ? gaze.angles : undefined);
-    setText(this.angles, head && gaze.angles ? directionWords(gaze.angles) : '');
+    this.dial.update(gaze?.angles);
+    setText(this.angles, gaze?.angles ? directionWords(gaze.angles) : '');
     const { sessionId: me, participants } = session;
-    const steering = head ? steerWords({ gaze, lease: pilot.lease, me, participants }) : '';
+    const steering = hasHead(gaze)
+      ? steerWords({ gaze, lease: pilot.lease, me, participants })
+      : '';
     setText(this.steer, steering);
     setText(this.reason, state.refusal('head') ?? pilot.lost);
     this.updateButtons();

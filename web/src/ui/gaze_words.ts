@@ -74,7 +74,7 @@ export function gazeWords(input: GazeInput): GazeWords {
   };
   switch (gaze?.mode) {
     case undefined:
-      return plain('○', 'not told yet');
+      return plain('○', 'not known now');
     case 'no_mount':
       return plain('○', 'fixed to the wearer: no head to turn');
     case 'idle':

@@ -82,7 +82,16 @@ describe('LeaseLoop', () => {
     await settle();
     loop.beat(450);
     expect(asked).toHaveLength(2);
-    expect(told).toEqual([{ kind: 'refused', reason: 'is no longer in force' }]);
+    expect(told).toEqual([{ kind: 'refused', reason: 'the lease has ended' }]);
+  });
+
+  it('says so where the server knows the session no longer', async () => {
+    const { loop, answers, told } = start('L');
+    loop.beat(150);
+    answers[0]?.(new ConnectError('session_id: unknown: call Join again', Code.NotFound));
+    await settle();
+    const reason = 'the connection was lost';
+    expect(told).toEqual([{ kind: 'refused', reason }]);
   });
 
   it('sends nothing more once ended, and says when nothing is under way', async () => {
@@ -151,7 +160,7 @@ describe('GazePilot', () => {
   it('stops its heartbeats when the lease is gone, and says who has it', async () => {
     const { pilot, calls, tell } = begin(granted('L'));
     await pilot.acquire();
-    tell({ kind: 'refused', reason: 'no longer in force' });
+    tell({ kind: 'refused', reason: 'the lease has ended' });
     await settle();
     expect(pilot.lease.kind).toBe('none');
     expect(pilot.lost).toBe('You pilot no longer: the wearer took over from Ann.');
@@ -166,7 +175,7 @@ describe('GazePilot', () => {
       queue: [{ sessionId: 's1' }],
     };
     Object.assign(state, create(GazeStateSchema, names));
-    tell({ kind: 'refused', reason: 'no longer in force' });
+    tell({ kind: 'refused', reason: 'the lease has ended' });
     await settle();
     expect(pilot.lease).toEqual({ kind: 'waiting', position: 1, pilot: 'wearer' });
     expect(pilot.lost).toBe('');
@@ -181,7 +190,7 @@ describe('GazePilot', () => {
     session.joined = create(JoinResponseSchema, { sessionId: 's2' });
     pilot.check();
     expect(pilot.lease.kind).toBe('none');
-    expect(calls.at(-1)).toBe('keep no more');
+    expect(calls.slice(-2)).toEqual(['keep no more', 'release']);
   });
 
   it('stops a head that nobody pilots, and does not keep it', async () => {
