@@ -1,7 +1,7 @@
 import type { GazeState } from '../gen/saccade/v1/gaze_pb';
 import { plainWords } from '../transport/errors';
-import type { KeepLease, LeaseKeeper } from '../transport/lease_keeper';
-import { type LeaseTold, toTold } from '../transport/lease_loop';
+import type { LeaseKeeper, LeaseKeeping } from '../transport/lease_keeper';
+import type { LeaseTold } from '../transport/lease_loop';
 import type { GazeTarget } from './gaze';
 import { fromTarget, toGaze } from './gaze_convert';
 import type { Session } from './session';
@@ -19,6 +19,7 @@ type Command = 'stopFixating' | 'home' | 'keepHorizon' | 'explore';
 
 const NONE: Lease = { kind: 'none' };
 const TIMEOUT = { timeoutMs: 2000 };
+const ANSWER_MS = 4000;
 
 /**
  * Pilots the head by lease: asks, queues, keeps the lease for as long as this page lives, notices
@@ -32,14 +33,20 @@ export class GazePilot {
   version = 0;
   private owner = ''; // the session whose lease it is
   private keeper: LeaseKeeper | undefined;
+  private answered: (() => void) | undefined; // ends the waiting for a first answer
 
   constructor(
     private readonly session: Session,
-    private readonly keep: KeepLease,
+    private readonly keeping: LeaseKeeping,
   ) {}
 
   get holds(): boolean {
     return this.lease.kind === 'held' && this.owner === this.session.sessionId;
+  }
+
+  /** Makes ready to pilot at once. */
+  warm(): void {
+    this.keeping.warm();
   }
 
   /** Asks for the lease; true if it is held now, false if others are before. */
@@ -47,12 +54,9 @@ export class GazePilot {
     if (this.holds) return true;
     if (this.lease.kind === 'waiting' && this.owner === this.session.sessionId) return false;
     void this.end('');
-    const sessionId = this.session.sessionId;
-    const reply = await this.ask(() =>
-      this.session.clients.gaze.acquireLease({ sessionId }, TIMEOUT),
-    );
-    this.begin(sessionId, toTold(reply));
-    return reply.granted;
+    const refused = await this.begin();
+    if (refused) throw new GazeError(refused);
+    return this.holds;
   }
 
   /** Gives the lease back, or leaves the queue. */
@@ -134,12 +138,32 @@ export class GazePilot {
     }
   }
 
-  private begin(sessionId: string, answer: LeaseTold): void {
-    void this.keeper?.stop(); // asked twice at the same time
+  /** Asks, and goes on asking; the first answer's refusal in words, or nothing. */
+  private async begin(): Promise<string> {
+    const { sessionId } = this.session;
     this.owner = sessionId;
-    this.told(answer);
-    const leaseId = this.lease.kind === 'held' ? this.lease.id : '';
-    this.keeper = this.keep(sessionId, leaseId, (told) => this.told(told));
+    let refused = '';
+    await new Promise<void>((resolve) => {
+      const slow = setTimeout(() => {
+        refused = 'the server did not answer in time';
+        void this.end('');
+      }, ANSWER_MS);
+      this.answered = () => {
+        clearTimeout(slow);
+        resolve();
+      };
+      this.keeper = this.keeping.keep(sessionId, (told) => {
+        if (this.answered && told.kind === 'refused') {
+          refused = told.reason;
+          void this.end('');
+        } else {
+          this.told(told);
+        }
+        this.answered?.();
+        this.answered = undefined;
+      });
+    });
+    return refused;
   }
 
   private told(told: LeaseTold): void {
@@ -171,12 +195,9 @@ export class GazePilot {
       return; // the refusal's own words have to do
     }
     if (version !== this.version) return; // something else was asked for meanwhile
-    const place = state?.queue.findIndex((one) => one.sessionId === sessionId) ?? -1;
-    if (place >= 0) {
-      const pilot = state?.pilot?.displayName ?? 'somebody';
-      const queuePosition = place + 1;
+    if (state?.queue.some((one) => one.sessionId === sessionId)) {
       this.lost = '';
-      this.begin(sessionId, { kind: 'answer', granted: false, leaseId: '', queuePosition, pilot });
+      await this.begin(); // in vain: then the reason is the one that ended it
     } else if (state?.lastHandover) {
       this.lost = `You pilot no longer: ${state.lastHandover}.`;
     }
@@ -185,6 +206,8 @@ export class GazePilot {
 
   private async end(why: string): Promise<void> {
     const { keeper } = this;
+    this.answered?.();
+    this.answered = undefined;
     this.keeper = undefined;
     this.lease = NONE;
     this.lost = why;

@@ -1,34 +1,40 @@
 import type { LeaseTold } from './lease_loop';
 
 export type ToKeeper =
-  | {
-      readonly kind: 'begin';
-      readonly baseUrl: string;
-      readonly sessionId: string;
-      readonly leaseId: string;
-    }
+  | { readonly kind: 'begin'; readonly baseUrl: string; readonly sessionId: string }
   | { readonly kind: 'alive' }
   | { readonly kind: 'end' };
 export type FromKeeper =
   | { readonly kind: 'told'; readonly told: LeaseTold }
   | { readonly kind: 'ended' };
 
-/** Keeps a lease, or a place in the queue (`leaseId` empty), until it is stopped. */
+/** Asks for the lease and keeps it, or a place in the queue, until it is stopped. */
 export interface LeaseKeeper {
   /** Resolves when no request is under way any more. */
   stop(): Promise<void>;
 }
-export type KeepLease = (
-  sessionId: string,
-  leaseId: string,
-  told: (told: LeaseTold) => void,
-) => LeaseKeeper;
 
-/** The main thread's end of the worker that sends the heartbeats. */
-export const keepLeaseAt =
-  (baseUrl: string): KeepLease =>
-  (sessionId, leaseId, told) => {
-    const worker = new Worker(new URL('./lease_worker.ts', import.meta.url), { type: 'module' });
+export interface LeaseKeeping {
+  /** Makes ready to keep one at once. */
+  warm(): void;
+  keep(sessionId: string, told: (told: LeaseTold) => void): LeaseKeeper;
+}
+
+/** The main thread's end of the worker that asks, and sends the heartbeats. */
+export class WorkerKeeping implements LeaseKeeping {
+  private spare: Worker | undefined; // a worker takes its time to start, the server waits 500 ms
+
+  constructor(private readonly baseUrl: string) {}
+
+  warm(): void {
+    this.spare ??= new Worker(new URL('./lease_worker.ts', import.meta.url), { type: 'module' });
+  }
+
+  keep(sessionId: string, told: (told: LeaseTold) => void): LeaseKeeper {
+    this.warm();
+    const worker = this.spare;
+    if (!worker) throw new Error('no worker');
+    this.spare = undefined;
     const send = (message: ToKeeper): void => worker.postMessage(message);
     let stopped: (() => void) | undefined;
     worker.onmessage = ({ data: message }: MessageEvent<FromKeeper>) => {
@@ -39,7 +45,7 @@ export const keepLeaseAt =
         told(message.told);
       }
     };
-    send({ kind: 'begin', baseUrl, sessionId, leaseId });
+    send({ kind: 'begin', baseUrl: this.baseUrl, sessionId });
     // This page's own timers stop when it hangs: then the heartbeats stop as well.
     const alive = setInterval(() => send({ kind: 'alive' }), 300);
     return {
@@ -50,4 +56,5 @@ export const keepLeaseAt =
           send({ kind: 'end' });
         }),
     };
-  };
+  }
+}

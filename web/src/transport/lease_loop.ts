@@ -1,5 +1,6 @@
 import { Code, ConnectError } from '@connectrpc/connect';
 import type { AcquireLeaseResponse } from '../gen/saccade/v1/gaze_pb';
+import { plainWords } from './errors';
 
 /** What comes back of asking for the lease again and again. */
 export type LeaseTold =
@@ -12,7 +13,7 @@ export type LeaseTold =
     }
   | { readonly kind: 'refused'; readonly reason: string };
 
-export const toTold = (reply: AcquireLeaseResponse): LeaseTold & { kind: 'answer' } => ({
+const toTold = (reply: AcquireLeaseResponse): LeaseTold => ({
   kind: 'answer',
   granted: reply.granted,
   leaseId: reply.leaseId,
@@ -27,18 +28,19 @@ const MAX_UNDER_WAY = 3; // a slow network delays heartbeats, it does not stop t
 const PAGE_HANGS_MS = 2000;
 
 /**
- * Renews a lease, or keeps a place in the queue and renews once it is granted, one `beat` at a time.
+ * Asks for the lease, keeps a place in the queue, renews what was granted, one `beat` at a time.
  * Without a sign of life from the page it pauses; refused, it is over.
  */
 export class LeaseLoop {
   private underWay = 0;
   private over = false;
+  private heard = false;
+  private leaseId = ''; // empty: not granted yet
   private aliveMs: number;
 
   constructor(
     private readonly acquire: Acquire,
     private readonly sessionId: string,
-    private leaseId: string, // empty: in the queue
     private readonly told: (told: LeaseTold) => void,
     nowMs: number,
   ) {
@@ -71,6 +73,7 @@ export class LeaseLoop {
 
   private answered(reply: AcquireLeaseResponse): void {
     if (this.over) return;
+    this.heard = true;
     this.leaseId = reply.leaseId;
     this.told(toTold(reply));
   }
@@ -78,12 +81,16 @@ export class LeaseLoop {
   private failed(error: unknown): void {
     if (this.over || mayPass(error)) return;
     this.over = true;
-    const { code } = ConnectError.from(error);
-    // Not that: then it is the session that the server does not know any more.
-    const passedOn = code === Code.FailedPrecondition || code === Code.PermissionDenied;
-    const reason = passedOn ? 'the lease has ended' : 'the connection was lost';
+    const reason = this.heard ? whyEnded(error) : plainWords(error);
     this.told({ kind: 'refused', reason });
   }
+}
+
+/** A lease that was passed on; else it is the session that the server does not know any more. */
+function whyEnded(error: unknown): string {
+  const { code } = ConnectError.from(error);
+  const passedOn = code === Code.FailedPrecondition || code === Code.PermissionDenied;
+  return passedOn ? 'the lease has ended' : 'the connection was lost';
 }
 
 /** True where the next heartbeat may fare better. */

@@ -12,16 +12,16 @@ const post = (message: FromKeeper): void => self.postMessage(message);
 let loop: LeaseLoop | undefined;
 let ending = false;
 
-function begin(baseUrl: string, sessionId: string, leaseId: string): void {
+function begin(baseUrl: string, sessionId: string): void {
   const client = createClient(GazeService, createGrpcWebTransport({ baseUrl }));
   loop = new LeaseLoop(
     (session, lease) =>
       client.acquireLease({ sessionId: session, leaseId: lease }, { timeoutMs: 2000 }),
     sessionId,
-    leaseId,
     (told) => post({ kind: 'told', told }),
     performance.now(),
   );
+  loop.beat(performance.now());
   setInterval(() => {
     if (!ending) loop?.beat(performance.now());
     else if (loop?.end()) post({ kind: 'ended' });
@@ -31,7 +31,7 @@ function begin(baseUrl: string, sessionId: string, leaseId: string): void {
 self.addEventListener('message', ({ data: message }: MessageEvent<ToKeeper>) => {
   switch (message.kind) {
     case 'begin':
-      begin(message.baseUrl, message.sessionId, message.leaseId);
+      begin(message.baseUrl, message.sessionId);
       break;
     case 'alive':
       loop?.alive(performance.now());

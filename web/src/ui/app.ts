@@ -3,7 +3,7 @@ import { gazeKey, hasHead } from '../session/gaze';
 import { GazePilot } from '../session/gaze_pilot';
 import { LatencyMeter, RateMeter, stageTimes } from '../session/latency';
 import type { Session } from '../session/session';
-import { keepLeaseAt } from '../transport/lease_keeper';
+import { WorkerKeeping } from '../transport/lease_keeper';
 import { AnnotationsPanel } from './annotations_panel';
 import { AppState } from './app_state';
 import { Controller } from './controller';
@@ -52,7 +52,7 @@ export class App {
     const { state } = this;
     this.map = new MapPane(session, player, state);
     this.video = new VideoPane(session, player, state);
-    this.pilot = new GazePilot(session, keepLeaseAt(location.origin));
+    this.pilot = new GazePilot(session, new WorkerKeeping(location.origin));
     const gaze = new GazeController(session, this.pilot, state);
     const edits = new Edits(session);
     const controller = new Controller(session, edits, state, this.map, this.video, gaze);
@@ -120,6 +120,7 @@ export class App {
     this.annotations.update();
     this.gaze.update();
     setClass(this.element, 'no-head', !hasHead(session.gaze));
+    if (hasHead(session.gaze)) this.pilot.warm();
   }
 
   private measure(): void {

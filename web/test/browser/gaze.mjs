@@ -38,6 +38,7 @@ export async function runGaze({ server: binary, chromium, seed, shots, folder })
     context.truth = new Truth(truthFile);
     context.ann = await Expert.open(chromium, `${server.http}/?name=Ann`);
     await context.ann.waitForStatus(/^tracking/, 60_000);
+    await context.ann.page.locator('.app[data-first-picture-ms]').waitFor();
     await turnAndHold(context);
     await wearerTakesOver(context);
     await handsChange(context, `${server.http}/?name=Bob`);
@@ -191,7 +192,9 @@ async function wearerTakesOver({ ann, session, gaze, check }) {
 /** Another expert sees who pilots, waits, and has the head; it stops; and rests when he is gone. */
 async function handsChange(context, url) {
   const { ann, check } = context;
+  await ann.enlarge('video'); // a small map costs the software GPU less, and so does a small page
   const bob = await ann.context.newPage();
+  await bob.setViewportSize({ width: 700, height: 500 });
   await bob.goto(url);
   const seen = await panelWhen(bob, ({ steer }) => steer === 'Ann pilots', 10_000);
   check('a second page sees who pilots', seen.ok, `"${seen.panel.steer}"`);

@@ -28,7 +28,7 @@ const queued = (queuePosition: number) =>
 const settle = () => new Promise((resolve) => setTimeout(resolve, 0));
 
 describe('LeaseLoop', () => {
-  const start = (leaseId: string) => {
+  const start = () => {
     const asked: string[] = [];
     const answers: ((answer: AcquireLeaseResponse | Error) => void)[] = [];
     const told: LeaseTold[] = [];
@@ -38,18 +38,28 @@ describe('LeaseLoop', () => {
         answers.push((answer) => (answer instanceof Error ? reject(answer) : resolve(answer)));
       });
     };
-    const loop = new LeaseLoop(acquire, 's1', leaseId, (one) => told.push(one), 0);
+    const loop = new LeaseLoop(acquire, 's1', (one) => told.push(one), 0);
     return { loop, asked, answers, told };
   };
 
-  it('goes on while answers are late, but not without end', () => {
-    const { loop, asked } = start('L');
+  /** One that was granted the lease L. */
+  const held = async () => {
+    const all = start();
+    all.loop.beat(0);
+    all.answers[0]?.(granted('L'));
+    await settle();
+    all.asked.length = all.answers.length = all.told.length = 0;
+    return all;
+  };
+
+  it('goes on while answers are late, but not without end', async () => {
+    const { loop, asked } = await held();
     for (let t = 150; t <= 900; t += 150) loop.beat(t);
     expect(asked).toEqual(['L', 'L', 'L']);
   });
 
   it('asks once at a time while it waits, and renews what it is granted', async () => {
-    const { loop, asked, answers, told } = start('');
+    const { loop, asked, answers, told } = start();
     loop.beat(150);
     loop.beat(300);
     expect(asked).toEqual(['']);
@@ -63,8 +73,8 @@ describe('LeaseLoop', () => {
     expect(told.map((one) => one.kind === 'answer' && one.granted)).toEqual([false, true]);
   });
 
-  it('pauses when the page hangs, and goes on with it', () => {
-    const { loop, asked } = start('L');
+  it('pauses when the page hangs, and goes on with it', async () => {
+    const { loop, asked } = await held();
     loop.beat(2100);
     expect(asked).toEqual([]);
     loop.alive(2200);
@@ -72,8 +82,8 @@ describe('LeaseLoop', () => {
     expect(asked).toEqual(['L']);
   });
 
-  it('passes over a lost heartbeat; ends with a refusal', async () => {
-    const { loop, asked, answers, told } = start('L');
+  it('passes over a lost heartbeat; ends when the lease has', async () => {
+    const { loop, asked, answers, told } = await held();
     loop.beat(150);
     answers[0]?.(new ConnectError('fetch failed', Code.Unavailable));
     await settle();
@@ -85,17 +95,22 @@ describe('LeaseLoop', () => {
     expect(told).toEqual([{ kind: 'refused', reason: 'the lease has ended' }]);
   });
 
-  it('says so where the server knows the session no longer', async () => {
-    const { loop, answers, told } = start('L');
+  it('says why it was never granted, and that the server knows the session no longer', async () => {
+    const never = start();
+    never.loop.beat(150);
+    const why = 'session_id: viewers change nothing';
+    never.answers[0]?.(new ConnectError(why, Code.PermissionDenied));
+    await settle();
+    expect(never.told).toEqual([{ kind: 'refused', reason: 'viewers change nothing' }]);
+    const { loop, answers, told } = await held();
     loop.beat(150);
     answers[0]?.(new ConnectError('session_id: unknown: call Join again', Code.NotFound));
     await settle();
-    const reason = 'the connection was lost';
-    expect(told).toEqual([{ kind: 'refused', reason }]);
+    expect(told).toEqual([{ kind: 'refused', reason: 'the connection was lost' }]);
   });
 
   it('sends nothing more once ended, and says when nothing is under way', async () => {
-    const { loop, asked, answers, told } = start('');
+    const { loop, asked, answers, told } = start();
     loop.beat(150);
     expect(loop.end()).toBe(false);
     answers[0]?.(granted('L'));
@@ -108,8 +123,16 @@ describe('LeaseLoop', () => {
 });
 
 describe('GazePilot', () => {
+  const mine = {
+    kind: 'answer',
+    granted: true,
+    leaseId: 'L',
+    queuePosition: 0,
+    pilot: 'Ann',
+  } as const;
+  const inQueue = { ...mine, granted: false, leaseId: '', queuePosition: 2 } as const;
   const pictures = { decode: () => undefined, reset: () => undefined, behind: false };
-  const begin = (answer: AcquireLeaseResponse) => {
+  const begin = (answer: LeaseTold | undefined) => {
     const calls: string[] = [];
     const note = (name: string) => () => {
       calls.push(name);
@@ -117,10 +140,6 @@ describe('GazePilot', () => {
     };
     const state = create(GazeStateSchema, { lastHandover: 'the wearer took over from Ann' });
     const gaze = {
-      acquireLease: () => {
-        calls.push('acquire');
-        return Promise.resolve(answer);
-      },
       releaseLease: note('release'),
       stopFixating: note('stop'),
       fixate: note('fixate'),
@@ -130,35 +149,49 @@ describe('GazePilot', () => {
     const session = new Session(clients, { role: 'expert', view: 'raw', name: 'Ann' }, pictures);
     session.joined = create(JoinResponseSchema, { sessionId: 's1' });
     let tell: (told: LeaseTold) => void = () => undefined;
-    const keep = (_session: string, lease: string, told: (told: LeaseTold) => void) => {
-      calls.push(`keep ${lease}`);
+    const keep = (_session: string, told: (told: LeaseTold) => void) => {
+      calls.push('keep');
       tell = told;
+      if (answer) setTimeout(() => told(answer), 0);
       return { stop: () => Promise.resolve(void calls.push('keep no more')) };
     };
-    const pilot = new GazePilot(session, keep);
+    const pilot = new GazePilot(session, { warm: () => undefined, keep });
     return { pilot, session, calls, state, tell: (told: LeaseTold) => tell(told) };
   };
 
   it('keeps what it was granted until it releases', async () => {
-    const { pilot, calls } = begin(granted('L'));
+    const { pilot, calls } = begin(mine);
     expect(await pilot.acquire()).toBe(true);
     expect(await pilot.acquire()).toBe(true);
     await pilot.release();
-    expect(calls).toEqual(['acquire', 'keep L', 'keep no more', 'release']);
+    expect(calls).toEqual(['keep', 'keep no more', 'release']);
     expect(pilot.lease.kind).toBe('none');
   });
 
+  it('says why it was refused, or that nobody answers', async () => {
+    const refused = begin({ kind: 'refused', reason: 'viewers change nothing' });
+    await expect(refused.pilot.acquire()).rejects.toThrow('viewers change nothing');
+    expect(refused.calls).toEqual(['keep', 'keep no more']);
+    vi.useFakeTimers();
+    const silent = begin(undefined);
+    const acquired = silent.pilot.acquire().catch(String);
+    await vi.advanceTimersByTimeAsync(4000);
+    vi.useRealTimers();
+    expect(await acquired).toContain('the server did not answer in time');
+    expect(silent.calls).toEqual(['keep', 'keep no more']);
+  });
+
   it('waits its turn', async () => {
-    const { pilot, calls, tell } = begin(queued(2));
+    const { pilot, calls, tell } = begin(inQueue);
     expect(await pilot.acquire()).toBe(false);
     expect(pilot.lease).toEqual({ kind: 'waiting', position: 2, pilot: 'Ann' });
-    tell({ kind: 'answer', granted: true, leaseId: 'L', queuePosition: 0, pilot: 'Bob' });
+    tell({ ...mine, pilot: 'Bob' });
     expect(pilot.holds).toBe(true);
-    expect(calls).toEqual(['acquire', 'keep ']);
+    expect(calls).toEqual(['keep']);
   });
 
   it('stops its heartbeats when the lease is gone, and says who has it', async () => {
-    const { pilot, calls, tell } = begin(granted('L'));
+    const { pilot, calls, tell } = begin(mine);
     await pilot.acquire();
     tell({ kind: 'refused', reason: 'the lease has ended' });
     await settle();
@@ -168,7 +201,7 @@ describe('GazePilot', () => {
   });
 
   it('waits on where the wearer took it from us', async () => {
-    const { pilot, calls, state, tell } = begin(granted('L'));
+    const { pilot, calls, state, tell } = begin(mine);
     await pilot.acquire();
     const names = {
       pilot: { sessionId: 'w', displayName: 'wearer' },
@@ -177,13 +210,14 @@ describe('GazePilot', () => {
     Object.assign(state, create(GazeStateSchema, names));
     tell({ kind: 'refused', reason: 'the lease has ended' });
     await settle();
+    expect(calls).toEqual(['keep', 'keep no more', 'keep']);
+    tell({ ...inQueue, queuePosition: 1, pilot: 'wearer' });
     expect(pilot.lease).toEqual({ kind: 'waiting', position: 1, pilot: 'wearer' });
     expect(pilot.lost).toBe('');
-    expect(calls.at(-1)).toBe('keep ');
   });
 
   it('drops the lease of a session that is over', async () => {
-    const { pilot, session, calls } = begin(granted('L'));
+    const { pilot, session, calls } = begin(mine);
     await pilot.acquire();
     pilot.check();
     expect(pilot.holds).toBe(true);
@@ -194,9 +228,9 @@ describe('GazePilot', () => {
   });
 
   it('stops a head that nobody pilots, and does not keep it', async () => {
-    const { pilot, session, calls } = begin(granted('L'));
+    const { pilot, session, calls } = begin(mine);
     await pilot.stop();
-    expect(calls).toEqual(['acquire', 'keep L', 'stop', 'keep no more', 'release']);
+    expect(calls).toEqual(['keep', 'stop', 'keep no more', 'release']);
     session.gaze = toGaze(
       create(GazeStateSchema, { pilot: { sessionId: 's9', displayName: 'Bob' } }),
     );
@@ -204,7 +238,7 @@ describe('GazePilot', () => {
   });
 
   it('says a refusal without the name of a field', async () => {
-    const { pilot, session } = begin(granted('L'));
+    const { pilot, session } = begin(mine);
     const refuse = vi.fn(() =>
       Promise.reject(new ConnectError('target.feature_id: 7 is not in the map', Code.NotFound)),
     );
