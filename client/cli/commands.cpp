@@ -13,9 +13,7 @@
 #include "client/cli/text.hpp"
 
 namespace saccade::cli {
-namespace {
 
-// The whole file or none: what could not be finished is removed.
 absl::Status WriteFile(const std::string& path, const std::string& data) {
   std::FILE* file = std::fopen(path.c_str(), "wb");
   if (file == nullptr) {
@@ -32,6 +30,8 @@ absl::Status WriteFile(const std::string& path, const std::string& data) {
   return absl::UnavailableError(absl::StrCat("cannot finish ", path, ": ", std::strerror(error),
                                              "; free some space or name another file with --out"));
 }
+
+namespace {
 
 std::string StatusText(const net::ServerStatus& status) {
   const MapSnapshot& pose = status.pose;
@@ -200,6 +200,8 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kRelease:
     case Command::kHome:
       return RunGaze(options, connection);
+    case Command::kCalibrateMount:
+      return RunCalibrateMount(options, connection);
   }
   return absl::InternalError("unknown command");
 }

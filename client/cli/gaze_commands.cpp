@@ -62,15 +62,6 @@ class StatePrinter {
   std::chrono::steady_clock::time_point next_;
 };
 
-absl::StatusOr<std::string> TakeLease(net::Connection& connection) {
-  const absl::StatusOr<net::Lease> lease = connection.AcquireLease("");
-  if (!lease.ok()) return lease.status();
-  if (lease->granted) return lease->lease_id;
-  connection.ReleaseLease().IgnoreError();  // whoever does not wait keeps no place
-  return absl::UnavailableError(
-      absl::StrCat(lease->pilot.display_name, " pilots the camera; try again when it is free"));
-}
-
 /// Heartbeats until `done` holds of the state, `for_s` has passed (0: never) or somebody
 /// interrupts.
 absl::StatusOr<GazeSnapshot> Hold(net::Connection& connection, const std::string& lease_id,
@@ -141,6 +132,15 @@ absl::Status RunStop(const Options& options, net::Connection& connection) {
 }
 
 }  // namespace
+
+absl::StatusOr<std::string> TakeLease(net::Connection& connection) {
+  const absl::StatusOr<net::Lease> lease = connection.AcquireLease("");
+  if (!lease.ok()) return lease.status();
+  if (lease->granted) return lease->lease_id;
+  connection.ReleaseLease().IgnoreError();  // whoever does not wait keeps no place
+  return absl::UnavailableError(
+      absl::StrCat(lease->pilot.display_name, " pilots the camera; try again when it is free"));
+}
 
 absl::Status RunGaze(const Options& options, net::Connection& connection) {
   signal(SIGINT, OnInterrupt);

@@ -159,6 +159,14 @@ void AddGaze(CLI::App& app, Options& options, Raw& raw) {
       ->check(CLI::Range(0.001, 1e9));
 }
 
+void AddCalibrateMount(CLI::App& app, Options& options) {
+  CLI::App* calibrate = app.add_subcommand(
+      "calibrate-mount",
+      "Turn the head for a minute and find its axes, offsets, encoder signs and delays");
+  calibrate->add_option("--out", options.out,
+                        "Write the [mount_model] table to this new TOML file; else print it");
+}
+
 Command CommandOf(const CLI::App& app) {
   static const std::map<std::string, Command> commands = {
       {"status", Command::kStatus},
@@ -175,7 +183,8 @@ Command CommandOf(const CLI::App& app) {
       {"fixate", Command::kFixate},
       {"stop", Command::kStop},
       {"release", Command::kRelease},
-      {"home", Command::kHome}};
+      {"home", Command::kHome},
+      {"calibrate-mount", Command::kCalibrateMount}};
   const CLI::App* chosen = app.get_subcommands().front();
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());
@@ -265,6 +274,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddAnnotate(app, options, raw);
   AddAnnotations(app, options);
   AddGaze(app, options, raw);
+  AddCalibrateMount(app, options);
 
   try {
     app.parse(argc, argv);

@@ -33,6 +33,7 @@ enum class Command {
   kStop,
   kRelease,
   kHome,
+  kCalibrateMount,
 };
 
 /// The command line, parsed and checked.
@@ -40,7 +41,7 @@ struct Options {
   Command command = Command::kStatus;
   net::ConnectionOptions connection;
   bool json = false;
-  std::string out;                             // map, snapshot: the file to write
+  std::string out;                             // map, snapshot, calibrate-mount: file to write
   net::VideoView view = net::VideoView::kRaw;  // snapshot
   std::optional<FrameId> frame;                // snapshot, annotate --pixel; nothing: the newest
   std::string id;                              // show, delete: UUID or the beginning of one

@@ -28,6 +28,9 @@ nlohmann::json ToJson(const Annotation& annotation);
 nlohmann::json ToJson(const std::vector<Annotation>& annotations);
 nlohmann::json ToJson(const net::WatchEvent& event);
 nlohmann::json ToJson(const GazeSnapshot& state);
+nlohmann::json ToJson(const MountCalibrationReport& report);
+/// What was found, for people: joints, residuals, delays.
+std::string CalibrationText(const MountCalibrationReport& report);
 
 /// "x 0.123 y -0.045 z 1.200 m"; of a world without scale, without the unit.
 std::string PointText(const Eigen::Vector3d& point, bool metric);

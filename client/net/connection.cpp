@@ -337,6 +337,20 @@ absl::StatusOr<GazeSnapshot> Connection::Home() {
   return wire::FromProto(response->state(), "state");
 }
 
+absl::StatusOr<GazeSnapshot> Connection::CalibrateMount() {
+  auto response = impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::CalibrateMount,
+                                       v1::CalibrateMountRequest());
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->state(), "state");
+}
+
+absl::StatusOr<MountCalibrationReport> Connection::GetMountCalibration() {
+  auto response = impl_->Call(*impl_->gaze_, &v1::GazeService::Stub::GetMountCalibration,
+                              v1::GetMountCalibrationRequest());
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->calibration(), "calibration");
+}
+
 absl::Status Connection::Watch(const std::function<bool(const WatchEvent&)>& on_event) {
   return impl_->Watch(on_event);
 }

@@ -80,6 +80,8 @@ class Connection {
   GazeAnswer Fixate(const GazeTarget& target, bool fast);
   GazeAnswer StopFixating();
   GazeAnswer Home();
+  GazeAnswer CalibrateMount();
+  absl::StatusOr<MountCalibrationReport> GetMountCalibration();
 
   /// Delivers poses, annotations, statistics and presence until `on_event` returns false (OK), the
   /// server goes away (an error) or closes the stream (OK). Acknowledges as it reads, so that what

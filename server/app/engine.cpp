@@ -135,6 +135,10 @@ void Engine::Track(Frame frame) {
   if (options_.mount && !options_.crop && !frame.mount) {
     frame.mount = options_.mount->AnglesAt(frame.capture_time_ns);
   }
+  if (gaze_) {  // what the joints do to the camera is what calibration has to find out
+    const std::shared_ptr<const GazeSnapshot> state = gaze_->snapshot();
+    if (state->calibration && state->calibration->running) frame.mount.reset();
+  }
   auto shared = std::make_shared<const Frame>(std::move(frame));
   TrackedFrame next{.frame = shared, .tracked = {}};
   TrackedEvent& tracked = next.tracked;
@@ -173,6 +177,11 @@ std::shared_ptr<const GazeSnapshot> Engine::gaze() const {
 }
 
 absl::Status Engine::SubmitGaze(GazeCommand command) {
+  const auto* steer = std::get_if<SteerGaze>(&command);
+  if (options_.crop && steer != nullptr && steer->what == SteerGaze::What::kCalibrate) {
+    return absl::FailedPreconditionError(
+        "calibrate-mount: crop: turns nothing, so there is nothing to calibrate");
+  }
   if (gaze_) return gaze_->Submit(std::move(command));
   return absl::FailedPreconditionError(
       "gaze: no mount: the camera is fixed to the wearer, so ask them to turn (or start the "

@@ -3,6 +3,7 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
+#include <absl/strings/strip.h>
 
 #include "server/capture/source.hpp"
 #include "server/mount/crop_mount.hpp"
@@ -25,6 +26,17 @@ absl::StatusOr<std::shared_ptr<SimMount>> OpenSimMount(const ServerConfig& confi
   options.wall_clock = true;
   options.seed = config.seed;
   if (absl::Status loaded = Load(config, options.mount); !loaded.ok()) return loaded;
+  const std::pair<std::string, std::string> parts =
+      absl::StrSplit(config.mount, absl::MaxSplits('?', 1));
+  if (!parts.second.empty()) {
+    absl::string_view rest = parts.second;
+    std::uint64_t seed = 0;
+    if (!absl::ConsumePrefix(&rest, "crooked=") || !absl::SimpleAtoi(rest, &seed)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--mount: sim?", parts.second, " is not understood; write for example sim?crooked=1"));
+    }
+    options.truth = CrookedMount(seed);
+  }
   return std::make_shared<SimMount>(options);
 }
 
@@ -80,7 +92,7 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenSim(const ServerConfig& config,
 
 absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config) {
   std::shared_ptr<SimMount> head;
-  if (config.mount == "sim") {
+  if (config.mount == "sim" || config.mount.rfind("sim?", 0) == 0) {
     absl::StatusOr<std::shared_ptr<SimMount>> made = OpenSimMount(config);
     if (!made.ok()) return made.status();
     head = *std::move(made);

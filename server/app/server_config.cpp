@@ -27,8 +27,9 @@ struct Raw {
 void AddFlags(CLI::App& app, Raw& raw) {
   app.set_version_flag("--version", std::string("saccade-server ") + kVersion);
   app.add_option("--source", raw.source, "sim:desk[?...] | dataset:DIR");
-  app.add_option("--mount", raw.mount,
-                 "none | sim | dynamixel:DEVICE[?baud=N] | v4l2:DEVICE | crop:[WxH]");
+  app.add_option(
+      "--mount", raw.mount,
+      "none | sim[?crooked=SEED] | dynamixel:DEVICE[?baud=N] | v4l2:DEVICE | crop:[WxH]");
   app.add_option("--config", raw.config, "TOML file; flags win over it");
   app.add_option("--data-dir", raw.data_dir, "annotations are kept here");
   app.add_option("--camera", raw.camera, "camera.yaml instead of the source's own");
@@ -116,17 +117,18 @@ absl::Status CheckAddresses(const Raw& raw, ServerConfig& config) {
 absl::Status CheckMount(const Raw& raw) {
   const auto [scheme, rest] =
       std::pair<std::string, std::string>(absl::StrSplit(raw.mount, absl::MaxSplits(':', 1)));
+  const bool sim = raw.mount == "sim" || raw.mount.rfind("sim?", 0) == 0;
   const bool has_rest = raw.mount.find(':') != std::string::npos;
   if (raw.mount == "none" || (scheme == "crop" && has_rest)) return absl::OkStatus();
-  if (raw.mount != "sim" && (!has_rest || (scheme != "dynamixel" && scheme != "v4l2"))) {
+  if (!sim && (!has_rest || (scheme != "dynamixel" && scheme != "v4l2"))) {
     return Bad(absl::StrCat("--mount: '", raw.mount,
                             "' is not known: use none, sim, dynamixel:/dev/ttyUSB0, "
                             "v4l2:/dev/video0 or crop:"));
   }
-  if (scheme == "sim" && raw.source.rfind("sim:", 0) != 0) {
+  if (sim && raw.source.rfind("sim:", 0) != 0) {
     return Bad("--mount: sim turns the camera of a sim: source only");
   }
-  if (scheme != "sim" && rest.empty()) {
+  if (!sim && rest.empty()) {
     return Bad(absl::StrCat("--mount: ", scheme, ": names no device: write for example ",
                             scheme == "v4l2" ? "v4l2:/dev/video0" : "dynamixel:/dev/ttyUSB0"));
   }

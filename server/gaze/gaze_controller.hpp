@@ -62,6 +62,8 @@ class GazeController {
   /// before is not believed (a tracker that has lost its way in a fast saccade), for as long as
   /// that was not long ago.
   void ObservePose(const PoseObservation& pose);
+  /// Somebody else has moved the head: the next step begins where the encoders say.
+  void LoseSync() { synchronised_ = false; }
   /// The map was thrown away: poses and target mean nothing now.
   void ForgetMap();
 

@@ -1,6 +1,7 @@
 #include "server/gaze/gaze_loop.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <utility>
@@ -24,6 +25,7 @@ GazeLoop::GazeLoop(Mount& mount, const GazeOptions& options, std::function<std::
       options_(options),
       controller_(mount.model(), options),
       arbiter_(options, std::move(new_id)),
+      calibration_(mount),
       exploring_(options.explore_when_idle) {
   Publish(0);
 }
@@ -61,12 +63,20 @@ absl::Status GazeLoop::Fixate(const GazeTarget& target, bool fast) {
   const absl::StatusOr<Eigen::Vector3d> point = Resolve(target);
   if (!point.ok()) return point.status();
   if (absl::Status taken = controller_.Fixate(*point, fast); !taken.ok()) return taken;
+  StopCalibrating("the head was given a target meanwhile; start again");
   exploring_ = false;
   target_ = target;
   return absl::OkStatus();
 }
 
-absl::Status GazeLoop::Carry(SteerGaze::What what) {
+void GazeLoop::StopCalibrating(const char* why) {
+  if (!calibration_.running()) return;
+  calibration_.Abandon(why);
+  controller_.LoseSync();
+}
+
+absl::Status GazeLoop::Carry(SteerGaze::What what, Timestamp now_ns) {
+  StopCalibrating("the head was told something else meanwhile; start again");
   target_.reset();
   exploring_ = false;
   switch (what) {
@@ -87,6 +97,9 @@ absl::Status GazeLoop::Carry(SteerGaze::What what) {
       controller_.Idle();
       exploring_ = true;
       break;
+    case SteerGaze::What::kCalibrate:
+      controller_.Idle();
+      return calibration_.Begin(now_ns);
   }
   return absl::OkStatus();
 }
@@ -95,7 +108,7 @@ void GazeLoop::Steer(const SteerGaze& command, Timestamp now_ns) {
   // The wearer stops the head whoever pilots.
   const bool always = command.caller.wearer && command.what == SteerGaze::What::kStop;
   absl::Status may = always ? absl::OkStatus() : arbiter_.MaySteer(command.caller, now_ns);
-  if (may.ok()) may = Carry(command.what);
+  if (may.ok()) may = Carry(command.what, now_ns);
   Publish(now_ns);
   if (!may.ok()) return command.done(may);
   command.done(snapshot_);
@@ -105,12 +118,12 @@ void GazeLoop::Execute(const GazeCommand& command, Timestamp now_ns) {
   if (const auto* acquire = std::get_if<AcquireGazeLease>(&command)) {
     absl::StatusOr<LeaseAnswer> answer =
         arbiter_.Acquire(acquire->caller, acquire->lease_id, now_ns);
-    React();
+    React(now_ns);
     Publish(now_ns);
     acquire->done(std::move(answer));
   } else if (const auto* release = std::get_if<ReleaseGazeLease>(&command)) {
     const absl::Status released = arbiter_.Release(release->caller, now_ns);
-    React();
+    React(now_ns);
     Publish(now_ns);
     release->done(released);
   } else if (const auto* fixate = std::get_if<FixateGaze>(&command)) {
@@ -123,32 +136,32 @@ void GazeLoop::Execute(const GazeCommand& command, Timestamp now_ns) {
     Steer(*steer, now_ns);
   } else if (const auto* override = std::get_if<OverrideGaze>(&command)) {
     const absl::Status taken = arbiter_.Override(override->caller, override->enabled, now_ns);
-    React();
+    React(now_ns);
     Publish(now_ns);
     override->done(taken);
   } else {
     const auto& pause = std::get<PauseGaze>(command);
     const absl::Status paused = arbiter_.Pause(pause.caller, pause.paused);
-    if (paused.ok() && pause.paused) Carry(SteerGaze::What::kStop).IgnoreError();
+    if (paused.ok() && pause.paused) Carry(SteerGaze::What::kStop, now_ns).IgnoreError();
     Publish(now_ns);
     pause.done(paused);
   }
 }
 
 // What the head does when it changes hands: nothing of the last pilot's goes on.
-void GazeLoop::React() {
+void GazeLoop::React(Timestamp now_ns) {
   for (Handover& change : arbiter_.TakeHandovers()) {
     if (change.why == Handover::Why::kVanished && !change.to) {
-      Carry(SteerGaze::What::kRelease).IgnoreError();
+      Carry(SteerGaze::What::kRelease, now_ns).IgnoreError();
       exploring_ = false;
       controller_.Park();
     } else if (change.why == Handover::Why::kGranted) {
       exploring_ = false;  // a pilot starts from a head at rest
       if (controller_.report().mode == GazeMode::kExplore) controller_.Idle();
     } else if (change.why == Handover::Why::kReleased && !change.to) {
-      Carry(SteerGaze::What::kRelease).IgnoreError();
+      Carry(SteerGaze::What::kRelease, now_ns).IgnoreError();
     } else {
-      Carry(SteerGaze::What::kStop).IgnoreError();
+      Carry(SteerGaze::What::kStop, now_ns).IgnoreError();
     }
     handovers_.push_back(std::move(change));
   }
@@ -162,6 +175,8 @@ void GazeLoop::OnView(const GazeView& view) {
     if (target_ && !std::holds_alternative<GazeAnnotation>(*target_)) target_.reset();
   }
   view_ = view;
+  // Meanwhile nobody knows how the joints turn the camera.
+  if (calibration_.running()) return calibration_.OnView(*view.map);
   controller_.SetDown(view.down_in_world);
   if (HasPose(*view.map) && view.angles) {
     controller_.ObservePose({view.map->capture_time_ns, view.map->world_from_camera, *view.angles});
@@ -186,7 +201,12 @@ void GazeLoop::Explore(Timestamp now_ns) {
 
 void GazeLoop::Step(Timestamp now_ns) {
   arbiter_.Tick(now_ns);
-  React();
+  React(now_ns);
+  if (calibration_.running()) {
+    calibration_.Step(now_ns);
+    if (!calibration_.running()) controller_.LoseSync();
+    return Publish(now_ns);
+  }
   if (exploring_ && !arbiter_.paused()) Explore(now_ns);
   const MountDemand demand = controller_.Step(now_ns, mount_.Newest(), mount_.status());
   // A refusal is in the status, which the controller has just read.
@@ -211,6 +231,11 @@ void GazeLoop::Publish(Timestamp now_ns) {
   snapshot->guidance_rad = report.guidance_rad;
   snapshot->world_from_view = report.world_from_view;
   snapshot->problem = report.problem;
+  snapshot->calibration = calibration_.report();
+  if (calibration_.running()) {
+    snapshot->problem = absl::StrFormat("the mount is being calibrated, %.0f %%: stand still",
+                                        100 * snapshot->calibration->share);
+  }
   snapshot->pilot = arbiter_.pilot();
   snapshot->queue = arbiter_.queue();
   snapshot->paused = arbiter_.paused();

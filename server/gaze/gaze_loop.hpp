@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/gaze/calibration_run.hpp"
 #include "server/gaze/explorer.hpp"
 #include "server/gaze/gaze_arbiter.hpp"
 #include "server/gaze/gaze_controller.hpp"
@@ -44,10 +45,12 @@ class GazeLoop {
 
  private:
   void Steer(const SteerGaze& command, Timestamp now_ns);
-  absl::Status Carry(SteerGaze::What what);
+  absl::Status Carry(SteerGaze::What what, Timestamp now_ns);
   std::optional<Eigen::Vector3d> PointOf(const GazeTarget& target) const;
   absl::StatusOr<Eigen::Vector3d> Resolve(const GazeTarget& target) const;
-  void React();
+  /// Without it the head is the controller's again.
+  void StopCalibrating(const char* why);
+  void React(Timestamp now_ns);
   void Explore(Timestamp now_ns);
   void Publish(Timestamp now_ns);
 
@@ -56,6 +59,7 @@ class GazeLoop {
   GazeController controller_;
   GazeArbiter arbiter_;
   Explorer explorer_;
+  CalibrationRun calibration_;
   GazeView view_;
   std::optional<GazeTarget> target_;
   bool exploring_ = false;

@@ -19,6 +19,28 @@ constexpr int kNotFollowing_ms = 300;
 
 }  // namespace
 
+MountOptions CrookedMount(std::uint64_t seed) {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  std::mt19937_64 rng(seed);
+  std::uniform_real_distribution<double> part(-1, 1);
+  MountOptions mount;
+  const auto straight = static_cast<MountJoint>(seed % kMountJoints);  // keeps its sign
+  for (int k = 0; k < kMountJoints; ++k) {
+    JointOptions& joint = mount.of(static_cast<MountJoint>(k));
+    const Eigen::Vector3d across =
+        joint.axis.cross(Eigen::Vector3d(part(rng), part(rng), part(rng)) + joint.axis * 2.0 +
+                         Eigen::Vector3d::Constant(0.3));
+    const double tilt = (3 + part(rng)) * kDegree;
+    joint.axis = Eigen::AngleAxisd(tilt, across.normalized()) * joint.axis;
+    joint.offset_m = 0.03 * Eigen::Vector3d(part(rng), part(rng), part(rng));
+    if (static_cast<MountJoint>(k) != straight) joint.encoder_sign = -1;
+    if (k > 0) joint.encoder_zero_rad = 6 * part(rng) * kDegree;
+  }
+  mount.encoder_delay_s = 0.035;
+  mount.command_latency_s = 0.06;
+  return mount;
+}
+
 SimMount::SimMount(const SimMountOptions& options)
     : options_(options),
       head_(options.truth.value_or(options.mount)),

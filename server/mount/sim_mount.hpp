@@ -26,6 +26,10 @@ struct SimMountOptions {
   bool wall_clock = false;
 };
 
+/// A head that is not built as everybody believes: axes 2 to 4 deg off, two encoders reversed,
+/// zeros off by some degrees, readings 35 ms late, commands 60 ms. For calibrate-mount to find out.
+MountOptions CrookedMount(std::uint64_t seed);
+
 /// A simulated head: three servos with limits of angle, rate and acceleration, encoders with noise,
 /// a delay between command and motion, and faults that tests put in. Moves in steps of 1 ms.
 class SimMount final : public Mount, public HeadMotion {

@@ -44,7 +44,7 @@ struct FixateGaze {
   Done<std::shared_ptr<const GazeSnapshot>> done;  // as it is just after
 };
 struct SteerGaze {
-  enum class What { kRelease, kHome, kStop, kHorizon, kExplore };
+  enum class What { kRelease, kHome, kStop, kHorizon, kExplore, kCalibrate };
   GazeCaller caller;
   What what = What::kStop;
   Done<std::shared_ptr<const GazeSnapshot>> done;

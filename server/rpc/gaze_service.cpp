@@ -148,6 +148,27 @@ grpc::ServerUnaryReactor* GazeService::Explore(Context* context, const v1::Explo
   return Steer(context, request, response, "Explore", SteerGaze::What::kExplore);
 }
 
+grpc::ServerUnaryReactor* GazeService::CalibrateMount(Context* context,
+                                                      const v1::CalibrateMountRequest* request,
+                                                      v1::CalibrateMountResponse* response) {
+  return Steer(context, request, response, "CalibrateMount", SteerGaze::What::kCalibrate);
+}
+
+grpc::ServerUnaryReactor* GazeService::GetMountCalibration(
+    Context* context, const v1::GetMountCalibrationRequest* /*request*/,
+    v1::GetMountCalibrationResponse* response) {
+  Reactor* reactor = context->DefaultReactor();
+  const std::shared_ptr<const MountCalibrationReport> report = backend_.gaze()->calibration;
+  if (report == nullptr) {
+    reactor->Finish(ToGrpc(absl::NotFoundError(
+        "calibrate-mount: nobody has calibrated since the server started; call CalibrateMount")));
+    return reactor;
+  }
+  *response->mutable_calibration() = wire::ToProto(*report);
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
 grpc::ServerUnaryReactor* GazeService::Override(Context* context,
                                                 const v1::OverrideRequest* request,
                                                 v1::OverrideResponse* /*response*/) {

@@ -32,6 +32,10 @@ class GazeService final : public v1::GazeService::CallbackService {
                        v1::KeepHorizonResponse* response) override;
   Reactor* Explore(Context* context, const v1::ExploreRequest* request,
                    v1::ExploreResponse* response) override;
+  Reactor* CalibrateMount(Context* context, const v1::CalibrateMountRequest* request,
+                          v1::CalibrateMountResponse* response) override;
+  Reactor* GetMountCalibration(Context* context, const v1::GetMountCalibrationRequest* request,
+                               v1::GetMountCalibrationResponse* response) override;
   Reactor* Override(Context* context, const v1::OverrideRequest* request,
                     v1::OverrideResponse* response) override;
   Reactor* Pause(Context* context, const v1::PauseRequest* request,

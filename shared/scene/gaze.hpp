@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -41,6 +42,30 @@ struct GazePilot {
   std::string display_name;
 };
 
+/// What calibrate-mount is doing, or has found.
+struct MountCalibrationReport {
+  bool running = true;
+  double share = 0;     // of the way, 0 to 1
+  std::string problem;  // why there is no result, with the remedy; empty: running, or well
+  std::string toml;     // the [mount_model] table for the server's file; empty until found
+  struct Joint {
+    std::string name;
+    bool moved = false;     // false: without a motor; left as it was
+    double range_rad = 0;   // that it moved
+    double turned_rad = 0;  // of its axis against the one before, signs apart
+    double axis_sigma_rad = 0;
+    bool sign_flipped = false;
+    double zero_shift_rad = 0;
+  };
+  std::vector<Joint> joints;
+  // Residuals of the camera's orientation: by the model before, by the one found.
+  double orientation_rms_before_rad = 0, orientation_rms_rad = 0, orientation_max_rad = 0;
+  double position_rms_m = 0;     // 0: the map has no metres
+  double encoder_delay_s = 0;    // of the encoders' time stamps against the pictures'
+  double command_latency_s = 0;  // from a command to the motion
+  int pictures = 0, outliers = 0;
+};
+
 /// Everything that is told about gaze; immutable once published.
 struct GazeSnapshot {
   GazeMode mode = GazeMode::kNoMount;
@@ -68,6 +93,8 @@ struct GazeSnapshot {
   std::optional<double> guidance_rad;
   /// Orientation of the optic axis when the newest demand acts; digital gaze crops by it.
   std::optional<Eigen::Quaterniond> world_from_view;
+  /// The last calibrate-mount; null: none so far. Asked for on its own, not streamed.
+  std::shared_ptr<const MountCalibrationReport> calibration;
 };
 
 /// "no mount", "idle", "saccade" ...

@@ -37,7 +37,7 @@ class ClosedLoop {
   std::vector<Annotation>& annotations() { return annotations_; }
 
   Rigid3 WorldFromCamera() const {
-    return wearer_(now_s()) * mount_.model().MountFromCamera(mount_.TrueAngles(now_ns_));
+    return wearer_(now_s()) * mount_.true_model().MountFromCamera(mount_.TrueAngles(now_ns_));
   }
   /// Between the TRUE optic axis and the point [deg].
   double TrueError_deg(const Eigen::Vector3d& point_in_world) const {
@@ -85,8 +85,8 @@ class ClosedLoop {
   void Publish(Timestamp frame_ns) {
     const std::optional<MountAngles> read = mount_.AnglesAt(frame_ns);
     map_.capture_time_ns = frame_ns;
-    map_.world_from_camera =
-        wearer_(Seconds(frame_ns)) * mount_.model().MountFromCamera(mount_.TrueAngles(frame_ns));
+    map_.world_from_camera = wearer_(Seconds(frame_ns)) *
+                             mount_.true_model().MountFromCamera(mount_.TrueAngles(frame_ns));
     map_.world_from_camera.rotation = map_.world_from_camera.rotation * pose_error_;
     GazeView view;
     view.map = std::make_shared<const MapSnapshot>(map_);

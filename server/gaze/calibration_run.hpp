@@ -1,0 +1,44 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/mount/mount.hpp"
+#include "server/mount/mount_calibrator.hpp"
+#include "shared/scene/gaze.hpp"
+
+namespace saccade {
+
+/// calibrate-mount as part of gaze control: while it runs, it has the head. What it finds is
+/// reported, not used: the model of a running server never changes. One thread.
+class CalibrationRun {
+ public:
+  /// `mount` outlives this.
+  explicit CalibrationRun(Mount& mount) : mount_(mount) {}
+
+  /// FailedPrecondition: the mount is not ready, or reads nothing.
+  absl::Status Begin(Timestamp now_ns);
+  bool running() const { return calibrator_ != nullptr; }
+  /// Ends it without a result.
+  void Abandon(const std::string& why);
+
+  void OnView(const MapSnapshot& map);
+  /// Demands the next place; at the end solves, which takes some tenths of a second.
+  void Step(Timestamp now_ns);
+
+  /// Null: nobody has asked yet.
+  std::shared_ptr<const MountCalibrationReport> report() const { return report_; }
+
+ private:
+  void Finish();
+
+  Mount& mount_;
+  std::unique_ptr<MountCalibrator> calibrator_;
+  std::optional<std::uint64_t> map_generation_;
+  std::shared_ptr<const MountCalibrationReport> report_;
+};
+
+}  // namespace saccade
