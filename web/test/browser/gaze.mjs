@@ -1,5 +1,6 @@
 // An expert turns the (simulated) head from the page: the real server, the real controller, and the
 // simulator's truth about where the camera really looks.
+import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { Expert } from './expert.mjs';
 import { inCamera, inWorld, length, minus, project, times, unproject } from './optics.mjs';
@@ -18,8 +19,12 @@ const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export async function runGaze({ server: binary, chromium, seed, shots, folder }) {
   const truthFile = join(folder, 'gaze-truth.jsonl');
+  // Two pages, simulator and tracker share two cores with a software GPU: the server waits longer for
+  // a heartbeat than the 500 ms it does by default.
+  const config = join(folder, 'gaze.toml');
+  writeFileSync(config, '[gaze]\nheartbeat_s = 2.0\n');
   const server = await startServer(binary, [
-    ...['--source', `sim:desk?seed=${seed}&motion=stand`, '--mount', 'sim'],
+    ...['--source', `sim:desk?seed=${seed}&motion=stand`, '--mount', 'sim', '--config', config],
     ...['--sim-truth', truthFile, '--data-dir', join(folder, 'gaze-data')],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);
@@ -180,7 +185,7 @@ async function wearerTakesOver({ ann, session, gaze, check }) {
   const waits = await panelWhen(ann.page, ({ steer }) => steer === queue, 2000);
   await gaze.override({ sessionId, enabled: false });
   const back = await panelWhen(ann.page, ({ steer }) => steer === 'you pilot', 2000);
-  await sleep(700); // longer than the server waits for a heartbeat
+  await sleep(2300); // longer than the server waits for a heartbeat
   const { steer } = await panelOf(ann.page);
   check(
     'the wearer takes over; given back, the pilot has it again and keeps it',
