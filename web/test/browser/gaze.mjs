@@ -102,7 +102,7 @@ async function turnAndHold(context) {
     );
     const seconds = (performance.now() - begin) / 1000;
     await sleep(500);
-    const { error, doing } = await panelOf(ann.page);
+    const { error, doing } = (await panelWhen(ann.page, ({ arrived }) => arrived, 3000)).panel;
     const truth = trueError(context, (await ann.look()).id, object);
     await shot(context, ann.page, `gaze-${pane}-hold`);
     check(
