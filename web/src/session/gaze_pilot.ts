@@ -199,7 +199,9 @@ export class GazePilot {
       this.lost = '';
       await this.begin(); // in vain: then the reason is the one that ended it
     } else if (state?.lastHandover) {
-      this.lost = `You pilot no longer: ${state.lastHandover}.`;
+      const late = !state.pilot && / vanished; nobody pilots$/.test(state.lastHandover);
+      const why = late ? 'this page was not heard in time' : state.lastHandover;
+      this.lost = `You pilot no longer: ${why}.`;
     }
     ++this.version;
   }

@@ -191,12 +191,17 @@ describe('GazePilot', () => {
   });
 
   it('stops its heartbeats when the lease is gone, and says who has it', async () => {
-    const { pilot, calls, tell } = begin(mine);
+    const { pilot, calls, state, tell } = begin(mine);
     await pilot.acquire();
     tell({ kind: 'refused', reason: 'the lease has ended' });
     await settle();
     expect(pilot.lease.kind).toBe('none');
     expect(pilot.lost).toBe('You pilot no longer: the wearer took over from Ann.');
+    state.lastHandover = 'Ann vanished; nobody pilots';
+    await pilot.acquire();
+    tell({ kind: 'refused', reason: 'the lease has ended' });
+    await settle();
+    expect(pilot.lost).toBe('You pilot no longer: this page was not heard in time.');
     expect(calls.at(-1)).toBe('keep no more');
   });
 
