@@ -50,7 +50,7 @@ std::string CalibrationText(const MountCalibrationReport& report) {
                     absl::StrFormat("%.2f deg", joint.turned_rad / kDegree),
                     absl::StrFormat("%.3f deg", joint.axis_sigma_rad / kDegree),
                     joint.sign_flipped ? "reversed" : "as it was",
-                    absl::StrFormat("%.2f deg", joint.zero_shift_rad / kDegree)});
+                    absl::StrFormat("%+.2f deg", joint.zero_shift_rad / kDegree + 1e-9)});
   }
   std::string text = Table(rows);
   absl::StrAppend(

@@ -2,7 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "server/mount/mount_toml.hpp"
 
@@ -47,6 +50,7 @@ absl::Status CalibrationRun::Begin(Timestamp now_ns) {
   }
   calibrator_ =
       std::make_unique<MountCalibrator>(mount_.model().options(), now_ns, reading->angles);
+  phase_ = Phase::kMoving;
   map_generation_.reset();
   report_ = std::make_shared<const MountCalibrationReport>();
   return absl::OkStatus();
@@ -58,12 +62,13 @@ void CalibrationRun::Abandon(const std::string& why) {
   report.running = false;
   report.problem = absl::StrCat("calibrate-mount: ", why);
   report_ = std::make_shared<const MountCalibrationReport>(std::move(report));
+  phase_ = Phase::kIdle;
   calibrator_.reset();
   mount_.Stop();
 }
 
 void CalibrationRun::OnView(const MapSnapshot& map) {
-  if (!running()) return;
+  if (phase_ != Phase::kMoving) return;
   if (map_generation_ && *map_generation_ != map.map_generation) {
     return Abandon("the map was reset meanwhile; start again");
   }
@@ -79,20 +84,30 @@ void CalibrationRun::OnView(const MapSnapshot& map) {
 }
 
 void CalibrationRun::Step(Timestamp now_ns) {
-  if (!running()) return;
+  if (phase_ == Phase::kSolving) {
+    if (solution_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+      Finish(solution_.get());
+    }
+    return;
+  }
+  if (phase_ != Phase::kMoving) return;
   const MountStatus status = mount_.status();
   if (status.health != MountHealth::kReady) return Abandon(status.problem);
   if (const std::optional<EncoderReading> reading = mount_.Newest()) calibrator_->Add(*reading);
-  if (calibrator_->Done(now_ns)) return Finish();
+  if (calibrator_->Done(now_ns)) {
+    phase_ = Phase::kSolving;
+    solution_ =
+        std::async(std::launch::async, [all = std::move(calibrator_)] { return all->Solve(); });
+    return;
+  }
   mount_.Send(calibrator_->Demand(now_ns)).IgnoreError();  // a refusal is in the status
   MountCalibrationReport report;
   report.share = calibrator_->Share(now_ns);
   report_ = std::make_shared<const MountCalibrationReport>(std::move(report));
 }
 
-void CalibrationRun::Finish() {
-  const absl::StatusOr<MountCalibration> found = calibrator_->Solve();
-  calibrator_.reset();
+void CalibrationRun::Finish(const absl::StatusOr<MountCalibration>& found) {
+  phase_ = Phase::kIdle;
   MountCalibrationReport report;
   if (found.ok()) {
     report = ReportOf(*found);

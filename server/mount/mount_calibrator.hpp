@@ -24,7 +24,7 @@ class MountCalibrator {
   void Add(const CalibrationData::Picture& picture) { data_.pictures.push_back(picture); }
   void SetMetric(bool metric) { data_.metric = metric; }
 
-  /// Takes some tens of milliseconds.
+  /// Takes a quarter of a second.
   absl::StatusOr<MountCalibration> Solve() const { return CalibrateMount(data_, present_); }
 
  private:

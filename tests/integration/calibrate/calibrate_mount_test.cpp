@@ -124,7 +124,7 @@ TEST(CalibrateMountThroughPixels, TheRealTrackerTellsHowACrookedHeadIsBuilt) {
   world.Run(3);  // a map
   ASSERT_EQ(world.state().joints_rad.has_value(), true);
   ASSERT_TRUE(world.Begin().ok());
-  for (int k = 0; k < 80 && world.state().calibration->running; ++k) world.Run(1);
+  for (int k = 0; k < 120 && world.state().calibration->running; ++k) world.Run(1);
   const std::shared_ptr<const MountCalibrationReport> report = world.state().calibration;
   ASSERT_FALSE(report->running);
   ASSERT_EQ(report->problem, "");

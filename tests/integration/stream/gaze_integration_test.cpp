@@ -163,6 +163,37 @@ TEST(Gaze, ThePilotTurnsTheHeadAndEverybodySeesIt) {
   }));
 }
 
+TEST(Gaze, CalibrationMovesTheHeadForItsPilotOnlyAndEndsWithAnyOtherCommand) {
+  std::shared_ptr<SimMount> head;
+  InProcessServer server(WithHead(&head));
+  Pilot pilot(server.address());
+  const auto calibration = [&](grpc::Status* status) {
+    grpc::ClientContext context;
+    v1::GetMountCalibrationResponse response;
+    *status = pilot.gaze().GetMountCalibration(&context, {}, &response);
+    return response.calibration();
+  };
+  grpc::Status status;
+  calibration(&status);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  ASSERT_TRUE(pilot.WaitForState([](const auto& state) { return state.has_pan_rad(); }));
+  EXPECT_EQ(pilot.Call(&v1::GazeService::Stub::CalibrateMount).error_code(),
+            grpc::StatusCode::FAILED_PRECONDITION)
+      << "without the lease";
+  ASSERT_TRUE(pilot.Rise());
+  ASSERT_TRUE(pilot.Call(&v1::GazeService::Stub::CalibrateMount).ok());
+  EXPECT_TRUE(pilot.WaitForState([](const auto& state) {
+    return state.problem().find("being calibrated") != std::string::npos && state.pan_rad() > 0.05;
+  }));
+  EXPECT_TRUE(calibration(&status).running());
+  EXPECT_GT(calibration(&status).share(), 0);
+  ASSERT_TRUE(pilot.Call(&v1::GazeService::Stub::StopFixating).ok());
+  const v1::MountCalibration ended = calibration(&status);
+  EXPECT_FALSE(ended.running());
+  EXPECT_THAT(ended.problem(), HasSubstr("start again"));
+  EXPECT_EQ(ended.toml(), "");
+}
+
 TEST(Gaze, TheHeadMovesSoonAfterTheCommand) {
   std::shared_ptr<SimMount> head;
   InProcessServer server(WithHead(&head));

@@ -104,6 +104,15 @@ TEST(CommandLine, OptionsOfTheProgramMayFollowTheCommand) {
   EXPECT_TRUE(result.options->json);
 }
 
+TEST(CommandLine, CalibrateMountTakesAFileOrNone) {
+  const ParseResult to_file = Parse({"calibrate-mount", "--out", "mount.toml"});
+  ASSERT_TRUE(to_file.options);
+  EXPECT_EQ(to_file.options->command, Command::kCalibrateMount);
+  EXPECT_EQ(to_file.options->out, "mount.toml");
+  EXPECT_TRUE(Parse({"calibrate-mount", "--json"}).options->json);
+  EXPECT_EQ(Parse({"calibrate-mount", "now"}).exit_code, kBadUsage);
+}
+
 TEST(CommandLine, AnnotationsMeansListUnlessToldOtherwise) {
   EXPECT_EQ(Parse({"annotations"}).options->command, Command::kListAnnotations);
   EXPECT_EQ(Parse({"annotations", "list"}).options->command, Command::kListAnnotations);

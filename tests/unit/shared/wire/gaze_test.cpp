@@ -74,5 +74,39 @@ TEST(GazeWire, BadStatesNameTheField) {
   EXPECT_THAT(std::string(FromProto(state, "state").status().message()), StartsWith("state.mode"));
 }
 
+TEST(WireGaze, ACalibrationComesBackAsItWas) {
+  MountCalibrationReport report;
+  report.running = false;
+  report.share = 1;
+  report.problem = "p";
+  report.toml = "[mount_model]\n";
+  report.joints = {{.name = "pan",
+                    .moved = true,
+                    .range_rad = 1,
+                    .turned_rad = 0.05,
+                    .axis_sigma_rad = 0.001,
+                    .sign_flipped = true,
+                    .zero_shift_rad = -0.1}};
+  report.orientation_rms_before_rad = 0.4;
+  report.orientation_rms_rad = 0.003;
+  report.orientation_max_rad = 0.01;
+  report.position_rms_m = 0.002;
+  report.encoder_delay_s = 0.035;
+  report.command_latency_s = 0.06;
+  report.pictures = 1400;
+  report.outliers = 3;
+  const auto back = wire::FromProto(wire::ToProto(report), "calibration");
+  ASSERT_TRUE(back.ok());
+  EXPECT_EQ(wire::ToProto(*back).SerializeAsString(), wire::ToProto(report).SerializeAsString());
+  EXPECT_EQ(back->joints[0].zero_shift_rad, -0.1);
+  EXPECT_TRUE(back->joints[0].sign_flipped);
+  EXPECT_EQ(back->toml, "[mount_model]\n");
+  EXPECT_EQ(back->pictures, 1400);
+  v1::MountCalibration bad = wire::ToProto(report);
+  bad.set_encoder_delay_s(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(wire::FromProto(bad, "calibration").status().code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
 }  // namespace
 }  // namespace saccade::wire
