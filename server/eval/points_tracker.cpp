@@ -9,11 +9,13 @@ constexpr std::size_t kMaxFeatures = 100;  // in the state
 constexpr std::size_t kBirths = 15;        // for one clone (slam-spec 5.4)
 constexpr int kEnough = 40;                // matches that need no new features
 constexpr std::size_t kWorthAClone = 4;    // fewest points that are worth a clone
+constexpr int kFewest = 5;                 // matches of a frame that was followed
 constexpr int kFramesBetweenBirths = 5;
 constexpr double kRelativeDepthSigma = 0.5;
 constexpr double kGateSquared = 9.0;  // of the search ellipse, 3 sigma
 constexpr double kLeastWeight = 0.1;  // of a match that is used, as in the tracker
 constexpr double kBorder_px = 12.0;   // a prediction nearer to the edge is no attempt
+constexpr double kSurprise = 3.0;     // times the motion noise, after an unexpected move
 constexpr double kTelling = 0.3;      // share of attempts below which a frame judges no feature
 
 Matrix12d StartCovariance() {
@@ -99,7 +101,8 @@ absl::Status PointsTracker::Correct(std::vector<Match>& matches) {
   std::size_t k = 0;
   for (Match& match : matches) {
     if (!match.found) continue;
-    const double weight = pose.weights[k++];
+    double weight = pose.weights[k++];
+    if (match.known) weight = std::max(weight, options_.least_target_weight);
     match.accepted = weight > kLeastWeight;
     if (!match.accepted) continue;
     Observation observation;
@@ -196,10 +199,20 @@ absl::StatusOr<PointsTrackStep> PointsTracker::Step(const PointsFrame& frame) {
     filter_.Predict(world_.dt_s, {options_.linear_sigma, options_.angular_sigma});
   }
   std::vector<Match> matches = Search(frame);
+  const auto found = std::count_if(matches.begin(), matches.end(), [](auto& m) { return m.found; });
+  if (followed_ && static_cast<double>(found) < kTelling * static_cast<double>(matches.size())) {
+    // Beyond what the motion model thinks possible: look again, wider, once (as the tracker does).
+    const MotionNoise wild = {kSurprise * options_.linear_sigma,
+                              kSurprise * options_.angular_sigma};
+    const Rigid3& pose = filter_.camera().world_from_camera;
+    filter_.Inflate(LineariseMotion(filter_.camera(), pose.rotation, world_.dt_s, wild).q);
+    matches = Search(frame);
+  }
   if (const absl::Status status = Correct(matches); !status.ok()) return status;
   PointsTrackStep step;
   step.attempted = static_cast<int>(matches.size());
   for (const Match& match : matches) step.accepted += match.accepted ? 1 : 0;
+  followed_ = step.accepted >= kFewest;
   inverse_range_ = MedianInverseRange(matches);
   Retire(matches);
   if (const absl::Status status = Birth(frame, step.accepted); !status.ok()) return status;

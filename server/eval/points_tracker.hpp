@@ -59,6 +59,7 @@ class PointsTracker {
   double inverse_range_ = 0.5;              // guess for new features [1/m]
   std::int64_t frame_ = -1;
   std::int64_t last_birth_ = -1000;
+  bool followed_ = false;  // the frame before had matches
 };
 
 }  // namespace saccade

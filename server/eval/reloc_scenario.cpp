@@ -23,11 +23,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kAway_m = 0.30, kAway_rad = 20.0 * std::numbers::pi / 180.0;
 constexpr double kRight_m = 0.03, kRight_rad = 1.0 * std::numbers::pi / 180.0;  // T18
 constexpr double kWrong_m = 0.10, kWrong_rad = 5.0 * std::numbers::pi / 180.0;  // a false place
 constexpr double kStart_s = 2.0;             // of the path: the map begins here
 constexpr int kLooks = 12;                   // frames that a pose is looked at from
+constexpr double kBorder_px = 20.0;          // nearer to the edge a feature is not recognised
 constexpr int kForeignPerPose = 5;           // pictures
 constexpr int kPerRoom = 50;                 // pictures of one other room
 constexpr int kMostBlind = 90;               // covered frames until it must be lost
@@ -62,9 +64,12 @@ class Feeder {
 
 /// What became of one look at the mapped room; crosses a pipe as bytes.
 struct Trial {
-  int frames = -1;  // until the pose was published; -1: never
+  int frames = -1;     // until the pose was published; -1: never
+  int recognised = 0;  // times that a place was recognised and then put to the proof
   double position_m = 0, rotation_rad = 0;
-  double slowest_ms = 0;  // frame
+  double slowest_ms = 0;            // frame
+  double away_m = 0, away_rad = 0;  // from the moment of the path that it was drawn about
+  int in_view = 0;                  // features of known depth that its picture could show
 };
 
 /// Runs `work` in a copy of this process, so that every trial starts from the same tracker.
@@ -94,7 +99,8 @@ absl::StatusOr<Trial> InCopy(const std::function<Trial()>& work) {
 struct Mapped {
   TrackerSession session;
   Frame last;
-  std::vector<Rigid3> path;  // true poses from kStart_s on
+  std::vector<Rigid3> path;             // true poses from kStart_s on
+  std::vector<Eigen::Vector3d> points;  // of features whose depth is known, at the end
   std::size_t tracked = 0, frames = 0, features = 0;
 };
 
@@ -116,6 +122,10 @@ absl::StatusOr<Mapped> MakeMap(const SimArguments& arguments) {
     ++mapped.frames;
     mapped.tracked += snapshot->status == TrackingStatus::kTracking ? 1 : 0;
     mapped.features = snapshot->features.size();
+    mapped.points.clear();
+    for (const FeatureSnapshot& feature : snapshot->features) {
+      if (feature.depth_known) mapped.points.push_back(feature.point_in_world);
+    }
     if (Seconds((*frame)->capture_time_ns) >= kStart_s) {
       mapped.path.push_back((*source)->WorldFromCamera((*frame)->id));
     }
@@ -137,16 +147,18 @@ Eigen::Vector3d InBall(std::mt19937_64& rng) {
   }
 }
 
-/// Somewhere within 30 cm and 20 deg of the path.
-Rigid3 NearPath(const std::vector<Rigid3>& path, const StillCamera& camera, std::mt19937_64& rng) {
+/// Somewhere within 30 cm and 20 deg of the path, and the moment of the path it was drawn about.
+std::pair<Rigid3, Rigid3> NearPath(const std::vector<Rigid3>& path, const StillCamera& camera,
+                                   std::mt19937_64& rng) {
   for (int tries = 0;; ++tries) {
-    Rigid3 pose = path[rng() % path.size()];
-    if (tries == 1000) return pose;  // a path along walls: then from where it was
+    const Rigid3 on_path = path[rng() % path.size()];
+    Rigid3 pose = on_path;
+    if (tries == 1000) return {pose, on_path};  // a path along walls: then from where it was
     pose.translation += kAway_m * InBall(rng);
     const Eigen::Vector3d axis = InBall(rng).normalized();
     const double angle = kAway_rad * std::uniform_real_distribution<double>(0.0, 1.0)(rng);
     pose.rotation = (pose.rotation * ExpQuaternion(angle * axis)).normalized();
-    if (camera.Clear(pose)) return pose;
+    if (camera.Clear(pose)) return {pose, on_path};
   }
 }
 
@@ -156,7 +168,7 @@ absl::StatusOr<std::vector<Trial>> RunTrials(const SimArguments& arguments, cons
   std::mt19937_64 rng(arguments.seed * 77 + 5);
   std::vector<Trial> trials;
   for (int k = 0; k < arguments.runs; ++k) {
-    const Rigid3 truth = NearPath(mapped.path, *camera, rng);
+    const auto [truth, on_path] = NearPath(mapped.path, *camera, rng);
     std::vector<cv::Mat> pictures;
     for (int look = 0; look < kLooks; ++look) {
       absl::StatusOr<cv::Mat> picture =
@@ -164,15 +176,21 @@ absl::StatusOr<std::vector<Trial>> RunTrials(const SimArguments& arguments, cons
       if (!picture.ok()) return picture.status();
       pictures.push_back(*std::move(picture));
     }
-    const absl::StatusOr<Trial> trial = InCopy([&]() -> Trial {
+    absl::StatusOr<Trial> trial = InCopy([&, &truth = truth]() -> Trial {
       Feeder feeder(mapped.session.track, mapped.last);
       Trial result;
       if (!feeder.Lose().ok()) return result;
+      TrackingStatus before = TrackingStatus::kLost;
       for (int look = 0; look < kLooks; ++look) {
         const Timestamp begin = MonotonicNow();
         const auto snapshot = feeder.Look(pictures[static_cast<std::size_t>(look)]);
         result.slowest_ms = std::max(result.slowest_ms, 1e3 * Seconds(MonotonicNow() - begin));
-        if (snapshot->status != TrackingStatus::kTracking) continue;
+        result.recognised += snapshot->status == TrackingStatus::kRelocalising &&
+                                     before != TrackingStatus::kRelocalising
+                                 ? 1
+                                 : 0;
+        before = snapshot->status;
+        if (before != TrackingStatus::kTracking) continue;
         result.frames = look + 1;
         result.position_m = (snapshot->world_from_camera.translation - truth.translation).norm();
         result.rotation_rad = RotationAngle(snapshot->world_from_camera, truth);
@@ -181,6 +199,12 @@ absl::StatusOr<std::vector<Trial>> RunTrials(const SimArguments& arguments, cons
       return result;
     });
     if (!trial.ok()) return trial.status();
+    trial->away_m = (truth.translation - on_path.translation).norm();
+    trial->away_rad = RotationAngle(truth, on_path);
+    for (const Eigen::Vector3d& point : mapped.points) {
+      const auto pixel = mapped.last.camera->Project(truth.Inverse() * point);
+      trial->in_view += pixel && mapped.last.camera->InImage(*pixel, kBorder_px) ? 1 : 0;
+    }
     trials.push_back(*trial);
   }
   return trials;
@@ -260,21 +284,36 @@ absl::Status LookElsewhere(const SimArguments& arguments, const Mapped& mapped,
   return absl::OkStatus();
 }
 
+std::string TrialTable(const std::vector<Trial>& trials) {
+  std::string text =
+      "pose,away_m,away_deg,features_in_view,recognised,frames,position_error_m,rotation_error_"
+      "deg\n";
+  for (std::size_t k = 0; k < trials.size(); ++k) {
+    const Trial& trial = trials[k];
+    absl::StrAppendFormat(&text, "%d,%.3f,%.2f,%d,%d,%d,%.4f,%.3f\n", k, trial.away_m,
+                          trial.away_rad * kDegrees, trial.in_view, trial.recognised, trial.frames,
+                          trial.position_m, trial.rotation_rad * kDegrees);
+  }
+  return text;
+}
+
 Json TrialReport(const std::vector<Trial>& trials) {
   Sample metres, degrees, waits_ms, slowest_ms;
-  int found = 0, right = 0, wrong = 0;
+  int found = 0, recognised = 0, right = 0, wrong = 0;
   for (const Trial& trial : trials) {
     slowest_ms.Add(trial.slowest_ms);
+    recognised += trial.recognised > 0 ? 1 : 0;
     if (trial.frames < 0) continue;
     ++found;
     right += trial.position_m <= kRight_m && trial.rotation_rad <= kRight_rad ? 1 : 0;
     wrong += trial.position_m > kWrong_m || trial.rotation_rad > kWrong_rad ? 1 : 0;
     metres.Add(trial.position_m);
-    degrees.Add(trial.rotation_rad * 180 / std::numbers::pi);
+    degrees.Add(trial.rotation_rad * kDegrees);
     waits_ms.Add(trial.frames * 1000.0 / 30.0);
   }
   Json report;
   report["poses"] = trials.size();
+  report["recognised"] = recognised;
   report["found"] = found;
   report["found_fraction"] = trials.empty() ? 0.0 : static_cast<double>(found) / trials.size();
   report["within_3_cm_and_1_deg"] = right;
@@ -306,6 +345,9 @@ absl::StatusOr<Json> RunRelocScenario(const SimArguments& arguments) {
   report["mapped_frames"] = mapped->tracked;
   report["map_features"] = mapped->features;
   report.update(TrialReport(*trials));
+  const absl::Status written =
+      WriteFileAtomically(arguments.out / "poses.csv", TrialTable(*trials));
+  if (!written.ok()) return written;
   ForeignLooks looks(*mapped);
   if (const absl::Status status = looks.Begin(); !status.ok()) return status;
   if (const absl::Status status = LookElsewhere(arguments, *mapped, looks); !status.ok()) {

@@ -83,6 +83,21 @@ TEST(Soak, WhatMovesLeavesTheMapT16) {
   EXPECT_LE(result->slow_features, result->moving_features / 50);
 }
 
+// In these starts the first features, whose depths are guesses, agree with each other on a wrong
+// pose, outvote the six points of the target, and drift by 10 cm while the filter claims 6 mm.
+TEST(Soak, StartsHoldWhereTheTargetIsNotOutvoted) {
+  for (const std::uint64_t seed : {3, 6, 10}) {
+    PointsOptions options;
+    options.seed = seed;
+    options.duration_s = 20;
+    options.least_target_weight = 0.5;
+    const auto result = RunSoak(options);
+    ASSERT_TRUE(result.ok()) << result.status();
+    EXPECT_EQ(result->lost_at_s, -1) << "seed " << seed;
+    EXPECT_LT(result->early_rmse_m, 0.01) << "seed " << seed;
+  }
+}
+
 TEST(Soak, SameSeedSameResult) {
   PointsOptions options;
   options.duration_s = 21;
