@@ -19,7 +19,12 @@ GazeRunner::GazeRunner(std::shared_ptr<Mount> mount, const GazeOptions& options,
       mailbox_(mailbox),
       publish_(std::move(publish)),
       loop_(*mount_, options, MakeUuid),
-      newest_(loop_.snapshot()) {}
+      newest_(loop_.snapshot()) {
+  loop_.SetListener([this](const std::shared_ptr<const GazeSnapshot>& state) {
+    const std::lock_guard lock(mutex_);
+    newest_ = state;
+  });
+}
 
 void GazeRunner::Start() {
   thread_ = std::jthread([this](std::stop_token stop) { Run(stop); });
@@ -76,10 +81,6 @@ GazeRunner::Work GazeRunner::WaitFor(std::chrono::steady_clock::time_point until
 
 void GazeRunner::Tell(bool now) {
   const std::shared_ptr<const GazeSnapshot> state = loop_.snapshot();
-  {
-    const std::lock_guard lock(mutex_);
-    newest_ = state;
-  }
   if (!now && state->time_ns - told_ns_ < kTellEvery) return;
   told_ns_ = state->time_ns;
   publish_(state);

@@ -242,6 +242,7 @@ void GazeLoop::Publish(Timestamp now_ns) {
   snapshot->handovers = arbiter_.handovers();
   snapshot->last_handover = arbiter_.last_words();
   snapshot_ = std::move(snapshot);
+  if (listener_) listener_(snapshot_);
 }
 
 }  // namespace saccade

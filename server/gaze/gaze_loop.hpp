@@ -40,6 +40,10 @@ class GazeLoop {
   GazeController& controller() { return controller_; }
 
   std::shared_ptr<const GazeSnapshot> snapshot() const { return snapshot_; }
+  /// Is told each new snapshot, before the command that caused it is answered: who asks after the
+  /// answer must not be told what was before.
+  using Listener = std::function<void(const std::shared_ptr<const GazeSnapshot>&)>;
+  void SetListener(Listener listener) { listener_ = std::move(listener); }
   /// Changes of hands since the last call.
   std::vector<Handover> TakeHandovers();
 
@@ -65,6 +69,7 @@ class GazeLoop {
   bool exploring_ = false;
   std::optional<Timestamp> looked_since_ns_;
   std::vector<Handover> handovers_;
+  Listener listener_;
   std::shared_ptr<const GazeSnapshot> snapshot_ = std::make_shared<GazeSnapshot>();
 };
 
