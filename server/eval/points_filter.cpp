@@ -115,11 +115,20 @@ Rigid3 PointsFilter::LinearisationPose(std::vector<Observation>& matches) {
   const RobustPose pose =
       EstimateRobustPose(world_.camera, prior, evidence, RobustPoseOptions(), random_);
   if (!options_.soft_gate) return pose.world_from_camera;
+  // Points of the target that are refused together are right together: the map has outvoted them.
+  int known = 0, refused = 0;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    known += matches[k].known_point ? 1 : 0;
+    refused += matches[k].known_point && pose.weights[k] <= kLeastWeight ? 1 : 0;
+  }
+  const double least_known = 2 * refused > known ? options_.least_target_weight : 0.0;
   std::vector<Observation> kept;
   for (std::size_t k = 0; k < matches.size(); ++k) {
-    if (pose.weights[k] <= kLeastWeight) continue;
+    const double least = matches[k].known_point ? least_known : 0.0;
+    const double weight = std::max(pose.weights[k], least);
+    if (weight <= kLeastWeight) continue;
     kept.push_back(matches[k]);
-    kept.back().noise /= pose.weights[k];
+    kept.back().noise /= weight;
   }
   matches = std::move(kept);
   return pose.world_from_camera;

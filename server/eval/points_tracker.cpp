@@ -97,12 +97,21 @@ absl::Status PointsTracker::Correct(std::vector<Match>& matches) {
   const PosePrior prior = {filter_.camera().world_from_camera, filter_.PoseCovariance()};
   const RobustPose pose =
       EstimateRobustPose(world_.camera, prior, evidence, RobustPoseOptions(), random_);
-  std::vector<Observation> observations;
+  // Points of the target that are refused together are right together: the map has outvoted them.
+  int known = 0, refused = 0;
   std::size_t k = 0;
+  for (const Match& match : matches) {
+    if (!match.found) continue;
+    known += match.known ? 1 : 0;
+    refused += match.known && pose.weights[k] <= kLeastWeight ? 1 : 0;
+    ++k;
+  }
+  const double least_known = 2 * refused > known ? options_.least_target_weight : 0.0;
+  std::vector<Observation> observations;
+  k = 0;
   for (Match& match : matches) {
     if (!match.found) continue;
-    double weight = pose.weights[k++];
-    if (match.known) weight = std::max(weight, options_.least_target_weight);
+    const double weight = std::max(pose.weights[k++], match.known ? least_known : 0.0);
     match.accepted = weight > kLeastWeight;
     if (!match.accepted) continue;
     Observation observation;

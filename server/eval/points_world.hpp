@@ -30,7 +30,8 @@ struct PointsOptions {
   bool soft_gate = false;
   /// Features by inverse range alone, bearings frozen at birth (ESID).
   bool range_only = false;
-  /// Weight that the robust pose may not go below for points of the target; 0: as the tracker.
+  /// Weight of the target's points where the robust pose refuses most of them at once; 0: as the
+  /// tracker, which leaves them out.
   double least_target_weight = 0.0;
   /// The last of the points stand together on something that starts to move about at this time
   /// [s]: somebody in the room (T16).
