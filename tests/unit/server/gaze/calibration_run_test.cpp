@@ -97,9 +97,9 @@ TEST(CalibrationRun, FindsOutHowTheHeadIsBuiltAndWithThatItLooksWhereItIsTold) {
   ASSERT_TRUE(found.LoadToml(file).ok());
   const double before = ErrorWith({}), after = ErrorWith(found), best = ErrorWith(CrookedMount(1));
   std::printf(
-      "true error of a held target: %.2f deg before, %.2f deg after; delay %.1f ms, "
-      "latency %.1f ms\n",
-      before, after, 1e3 * report->encoder_delay_s, 1e3 * report->command_latency_s);
+      "true error of a held target: %.2f deg before, %.2f deg after, %.2f deg with the true "
+      "model; delay %.1f ms, latency %.1f ms\n",
+      before, after, best, 1e3 * report->encoder_delay_s, 1e3 * report->command_latency_s);
   EXPECT_GT(before, 5);
   EXPECT_LT(after, best + 0.1);
 }
