@@ -65,6 +65,7 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
   }
   TrackerOptions tracker_options;
   tracker_options.seed = config.seed;
+  tracker_options.adjust_live = true;
   if (!config.config_file.empty()) {
     const absl::Status loaded = tracker_options.LoadToml(config.config_file);
     if (!loaded.ok()) return loaded;

@@ -15,6 +15,7 @@ FilterState::FilterState(const FilterOptions& options) : options_(options) {
 }
 
 void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance) {
+  mark_.reset();
   camera_ = camera;
   first_pose_ = camera.world_from_camera;
   anchors_.clear();
@@ -32,6 +33,7 @@ void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance)
 }
 
 void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covariance) {
+  mark_.reset();
   camera_ = camera;
   first_pose_ = camera.world_from_camera;
   covariance_.ReplaceBlock(0, covariance);
@@ -78,6 +80,7 @@ void FilterState::Predict(double dt, const MotionNoise& noise) {
   for (int k = 0; k < steps; ++k) {
     const MotionJacobians jacobians = LineariseMotion(
         camera_, Fej() ? first_pose_.rotation : camera_.world_from_camera.rotation, step, noise);
+    if (mark_) mark_->journal.Add(Journal::Predicted{jacobians.f});
     covariance_.TransformBlock(0, jacobians.f);
     covariance_.AddBlock(0, jacobians.q);
     camera_ = PropagateMotion(camera_, step);
@@ -90,6 +93,7 @@ void FilterState::Inflate(const Matrix12d& extra) { covariance_.AddBlock(0, extr
 AnchorPoseId FilterState::AddAnchor() {
   const Eigen::MatrixXd rows = covariance_.Block(0, 0, kPoseDim, dim());
   const int offset = covariance_.Append(kPoseDim);
+  if (mark_) mark_->journal.Add(Journal::Cloned{});
   for (int c = 0; c < offset; ++c) {
     for (int r = 0; r < kPoseDim; ++r) covariance_.lower(offset + r, c) = rows(r, c);
   }
@@ -125,6 +129,7 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& bi
       feature.basis.transpose() * birth.bearing_covariance * feature.basis;
   const int size = FeatureDim();
   feature.offset = covariance_.Append(size);
+  if (mark_) mark_->journal.Add(Journal::Appended{size});
   feature.birth_covariance = tangent;
   if (size == 3) covariance_.AddBlock(feature.offset, tangent);
   covariance_.lower(feature.offset + size - 1, feature.offset + size - 1) =
@@ -166,6 +171,7 @@ void FilterState::RemoveRows(const std::vector<std::pair<int, int>>& offset_and_
     if (!dropped[k]) keep.push_back(k);
   }
   covariance_.Keep(keep);
+  if (mark_) mark_->journal.Add(Journal::Kept{keep});
   for (Anchor& anchor : anchors_) anchor.offset = moved[anchor.offset];
   for (Feature& feature : features_) feature.offset = moved[feature.offset];
 }

@@ -5,11 +5,14 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "server/filter/covariance.hpp"
+#include "server/filter/journal.hpp"
 #include "server/filter/motion_model.hpp"
 #include "server/filter/parallax.hpp"
 #include "server/filter/point_model.hpp"
@@ -57,6 +60,17 @@ struct FeatureMarginal {
 struct UpdateReport {
   int rows = 0;
   double nis = 0.0;  // r^T S^-1 r, of `rows` degrees of freedom
+};
+
+/// Estimates that are better than the filter's were at its mark.
+struct Refinement {
+  struct Feature {
+    Eigen::Vector3d bearing;  // unit, in its clone
+    double inverse_range;     // [1/m]
+  };
+  std::map<AnchorPoseId, Rigid3> anchors;
+  std::map<FeatureId, Feature> features;
+  std::optional<Rigid3> world_from_camera;  // at the mark
 };
 
 struct FilterOptions {
@@ -143,6 +157,19 @@ class FilterState {
                                       std::span<const Observation> observations,
                                       const Rigid3& linearisation);
 
+  /// The clone that a feature hangs on. `id` must exist.
+  AnchorPoseId AnchorOf(FeatureId id) const { return Find(id)->anchor; }
+  bool HasAnchor(AnchorPoseId id) const;
+  std::optional<Rigid3> AnchorPose(AnchorPoseId id) const;
+  /// Remembers the present estimates, and from now on what happens to their errors.
+  void Mark();
+  void DropMark();
+  /// Moves the estimates of the mark to better ones, found elsewhere from the same measurements
+  /// (README: bundle adjustment), and the present ones to where they would be had that been known
+  /// then. The covariance is carried along, neither smaller nor larger. Ends the mark; does nothing
+  /// without one.
+  void Refine(const Refinement& refinement);
+
   /// Removes features whose inverse range is negative by two sigma; returns them.
   std::vector<FeatureId> RemoveBehind();
 
@@ -195,12 +222,25 @@ class FilterState {
   /// Of each of their ranges, in order, the share of its gain that is not taken.
   Eigen::VectorXd KeptShares(const std::vector<Turned>& turned) const;
   void JudgeNoise(const UpdateReport& report);
-  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report);
-  absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report);
+  /// Both: the errors to correct; `gain` and `factor` as the journal wants them.
+  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report,
+                                             Journal::Updated& record);
+  absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report,
+                                                  Journal::Updated& record);
   void Correct(const Eigen::VectorXd& error);
   /// Carries the covariance along when estimates move by `step`: a scale error then moves them by
   /// what they are now, not by what they were (README: scale).
   void CarryScale(const Eigen::VectorXd& step);
+
+  /// Estimates as they were, and how their errors have changed since.
+  struct Marked {
+    CameraMotion camera;
+    std::vector<Anchor> anchors;
+    std::vector<Feature> features;
+    int dim = 0;
+    Journal journal;
+  };
+  std::optional<Marked> mark_;
 
   FilterOptions options_;
   CameraMotion camera_;

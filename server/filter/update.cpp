@@ -17,14 +17,7 @@ using Eigen::VectorXd;
 /// Sparse measurement model of one frame: two rows an observation, three blocks
 /// each.
 struct FilterState::Linearised {
-  struct Rows {
-    Eigen::Matrix<double, 2, 6> d_camera;
-    Eigen::Matrix<double, 2, 6> d_anchor;
-    Eigen::Matrix<double, 2, 3> d_point;  // last point_dim columns
-    int anchor = -1;                      // offset; -1: known point
-    int point = -1;
-    int point_dim = 0;
-    Eigen::Vector2d d_readout;
+  struct Rows : Journal::Updated::Rows {
     Eigen::Matrix2d noise;
   };
   std::vector<Rows> rows;
@@ -70,6 +63,7 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
     const Observation& observation = observations[k];
     Linearised::Rows& rows = all.rows[k];
     rows.noise = observation.noise;
+    rows.readout = readout_offset_;
     rows.d_readout = observation.d_readout;
     std::optional<PixelPrediction> at;
     Eigen::Vector2d ahead = Eigen::Vector2d::Zero();
@@ -143,7 +137,8 @@ std::vector<FilterState::Turned> FilterState::ExplainByTurning(
   return all;
 }
 
-absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, UpdateReport& report) {
+absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, UpdateReport& report,
+                                                 Journal::Updated& record) {
   const int n = dim();
   const int m = static_cast<int>(all.innovation.size());
   MatrixXd pht(n, m);  // P H^T
@@ -190,10 +185,15 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, UpdateRe
   VectorXd error = pht * whitened;
   if (!error.allFinite()) return absl::FailedPreconditionError("filter: update is not finite");
   covariance_.Downdate(pht);
+  if (mark_) {
+    record.gain = std::move(pht);
+    record.factor = factor.matrixL();
+  }
   return error;
 }
 
-absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, UpdateReport& report) {
+absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, UpdateReport& report,
+                                                      Journal::Updated& record) {
   const int n = dim();
   const int m = static_cast<int>(all.innovation.size());
   // P+ = (I + P A)^-1 P with A = sum H_k^T R_k^-1 H_k: P itself need not be
@@ -226,6 +226,7 @@ absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, Upd
   report.rows = m;
   report.nis = all.innovation.dot(weighted_innovation) - pulled.dot(error);
   covariance_.Assign(0.5 * (posterior + posterior.transpose()));
+  if (mark_) record.gain.noalias() = posterior * weighted.transpose();
   return error;
 }
 
@@ -271,13 +272,21 @@ absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
   }
   const MatrixXd before = covariance_.Among(ranges);
   const bool information = static_cast<int>(all->innovation.size()) > dim();
-  auto error = information ? InformationStep(*all, report) : KalmanStep(*all, report);
+  Journal::Updated record;
+  auto error =
+      information ? InformationStep(*all, report, record) : KalmanStep(*all, report, record);
   if (!error.ok()) return error.status();
   JudgeNoise(report);
   // Partial update (README: parallax): inverse ranges take only a share of their gain.
   const VectorXd kept = KeptShares(turned);
   for (std::size_t k = 0; k < ranges.size(); ++k) {
-    (*error)[ranges[k]] *= 1.0 - kept[static_cast<Eigen::Index>(k)];
+    const double taken = 1.0 - kept[static_cast<Eigen::Index>(k)];
+    (*error)[ranges[k]] *= taken;
+    if (mark_) record.gain.row(ranges[k]) *= taken;
+  }
+  if (mark_) {
+    record.rows.assign(all->rows.begin(), all->rows.end());
+    mark_->journal.Add(std::move(record));
   }
   covariance_.Blend(ranges, before, kept * kept.transpose());
   first_pose_ = linearisation;

@@ -146,6 +146,7 @@ absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
   const AnchorPoseId anchor = filter_.AddAnchor();
   const auto id = keeper_.Plant(last_frame_, seen.pixel, depth, anchor, matcher_, filter_, map_);
   filter_.Remove({});
+  refiner_.Keep(camera, filter_, matches_, depth_.inverse_range);
   if (!id) return absl::NotFoundError("feature: no texture to track at this pixel");
   map_.Find(*id)->seeded = true;
   return *id;

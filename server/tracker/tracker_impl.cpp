@@ -58,7 +58,8 @@ Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
       keeper_(options),
       starter_(source, options),
       monitor_(options),
-      relocaliser_(MakeRelocaliserOptions(options)) {}
+      relocaliser_(MakeRelocaliserOptions(options)),
+      refiner_(options) {}
 
 void Tracker::Impl::Reset() {
   filter_.Reset(CameraMotion(), Matrix12d::Zero());
@@ -67,6 +68,7 @@ void Tracker::Impl::Reset() {
   starter_.Reset();
   monitor_.Reset();
   relocaliser_.Clear();
+  refiner_.Reset();
   matches_ = FrameMatches();
   before_relocalisation_.reset();
   started_ = metric_ = has_frame_ = false;
@@ -89,6 +91,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   if (!started_) {
     Begin(frame);
   } else if (monitor_.status() == TrackingStatus::kLost) {
+    refiner_.Drop(filter_);
     Recover(frame);
   } else {
     Follow(frame, dt);
@@ -119,6 +122,7 @@ void Tracker::Impl::Begin(const Frame& frame) {
   const int born = static_cast<int>(filter_.feature_count());
   matches_.attempted += born;
   matches_.accepted += born;
+  refiner_.Keep(*frame.camera, filter_, matches_, depth_.inverse_range);
   if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
 }
 
@@ -234,10 +238,13 @@ void Tracker::Impl::Manage(const Frame& frame) {
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;
+  if (refiner_.Finish(frames_, filter_)) ++revision_;
   if (!telling || covered) return;
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
                random_);
+  refiner_.Keep(*frame.camera, filter_, matches_, depth_.inverse_range);
+  refiner_.Start(frames_, filter_);
   KeepKeyframe(frame);
 }
 

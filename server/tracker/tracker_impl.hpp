@@ -6,6 +6,7 @@
 #include "server/map/relocaliser.hpp"
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/map_keeper.hpp"
+#include "server/tracker/refiner.hpp"
 #include "server/tracker/starter.hpp"
 #include "server/tracker/status_monitor.hpp"
 #include "server/tracker/tracker.hpp"
@@ -49,6 +50,7 @@ class Tracker::Impl {
   Starter starter_;
   StatusMonitor monitor_;
   Relocaliser relocaliser_;
+  Refiner refiner_;
   ImagePyramid pyramid_;
 
   Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows

@@ -35,17 +35,22 @@ struct TrackerOptions {
 
   // Search (slam-spec 5.1).
   int first_stage = 20;         // features searched widely, for the robust pose
-  int measured_per_frame = 70;  // 50 to 60 are enough, 100 safe (findings)
+  int measured_per_frame = 100;  // 50 to 60 are enough, 100 safe (findings)
   double gate_sigma = 3.0;      // half axis of the search ellipse: p = 0.989
   double max_nssd = 0.40;       // NCC 0.80
   int patch_px = 11;            // side of the compared patch
 
   // Map.
-  int features_in_view = 60;         // new ones are started below
+  int features_in_view = 80;         // new ones are started below
   int max_features = 250;            // in the filter; update time grows with the square
   int births_per_clone = 15;         // features that share one pose clone (slam-spec 5.4)
   double corner_min_score = 2000.0;  // see CornerOptions; plain walls must still give some
   double initial_depth_m = 1.0;      // of the first features without a target: sets the scale
+
+  // Bundle adjustment on another core.
+  bool adjust = true;
+  int adjust_delay = 2;      // frames from its start until its result is taken
+  bool adjust_live = false;  // a result that is late is taken later; false: it is waited for
 
   // State machine (slam-spec 2).
   int coasting_below = 5;     // accepted matches a frame

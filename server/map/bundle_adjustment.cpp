@@ -1,0 +1,242 @@
+#include "server/map/bundle_adjustment.hpp"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "server/filter/point_model.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr double kBehind = 1e-3;     // cosine below which a ray is not seen
+constexpr double kLossSigmas = 1.0;  // matches' sigmas are set with a margin
+
+template <typename T>
+using Vec3 = Eigen::Matrix<T, 3, 1>;
+
+/// Keyframe: [x y z w | translation], as Eigen stores them.
+using PoseBlock = std::array<double, 7>;
+/// Point: [tangent u v | inverse range].
+using PointBlock = std::array<double, 3>;
+
+PoseBlock Pack(const Rigid3& pose) {
+  PoseBlock block;
+  Eigen::Map<Eigen::Quaterniond>(block.data()) = pose.rotation;
+  Eigen::Map<Eigen::Vector3d>(block.data() + 4) = pose.translation;
+  return block;
+}
+
+Rigid3 Unpack(const PoseBlock& block) {
+  return {Eigen::Map<const Eigen::Quaterniond>(block.data()).normalized(),
+          Eigen::Map<const Eigen::Vector3d>(block.data() + 4)};
+}
+
+/// Tangent coordinates of `direction` (any length) around a measured ray, in sigmas.
+struct RayError {
+  RayError(const Eigen::Vector3d& measured, double sigma_rad)
+      : ray(measured), weighted_basis(TangentBasis(measured) / sigma_rad) {}
+
+  template <typename T>
+  bool operator()(const Vec3<T>& direction, T* residual) const {
+    const T along = direction.dot(ray.cast<T>());
+    if (along < T(kBehind) * direction.norm()) return false;
+    Eigen::Map<Eigen::Matrix<T, 2, 1>> error(residual);
+    error = weighted_basis.cast<T>().transpose() * direction / along;
+    return true;
+  }
+
+  Eigen::Vector3d ray;
+  Eigen::Matrix<double, 3, 2> weighted_basis;
+};
+
+struct BearingOf {
+  Eigen::Vector3d bearing;
+  Eigen::Matrix<double, 3, 2> basis;
+
+  template <typename T>
+  Vec3<T> operator()(const T* point) const {
+    const Vec3<T> moved =
+        bearing.cast<T>() + basis.col(0).cast<T>() * point[0] + basis.col(1).cast<T>() * point[1];
+    return moved.normalized();
+  }
+};
+
+struct SightingCost {
+  RayError error;
+  BearingOf bearing;
+
+  template <typename T>
+  bool operator()(const T* camera, const T* anchor, const T* point, T* residual) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> turn_camera(camera), turn_anchor(anchor);
+    const Eigen::Map<const Vec3<T>> at_camera(camera + 4), at_anchor(anchor + 4);
+    const Vec3<T> in_world = turn_anchor * bearing(point) + point[2] * (at_anchor - at_camera);
+    return error(Vec3<T>(turn_camera.conjugate() * in_world), residual);
+  }
+};
+
+struct BirthCost {
+  RayError error;
+  BearingOf bearing;
+  double prior_inverse_range, prior_sigma;
+
+  template <typename T>
+  bool operator()(const T* point, T* residual) const {
+    residual[2] = (point[2] - T(prior_inverse_range)) / T(prior_sigma);
+    return error(bearing(point), residual);
+  }
+};
+
+struct KnownCost {
+  RayError error;
+  Eigen::Vector3d point;
+
+  template <typename T>
+  bool operator()(const T* camera, T* residual) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> turn(camera);
+    const Eigen::Map<const Vec3<T>> at(camera + 4);
+    return error(Vec3<T>(turn.conjugate() * (point.cast<T>() - at)), residual);
+  }
+};
+
+class Stopper : public ceres::IterationCallback {
+ public:
+  explicit Stopper(const std::atomic<bool>& stop) : stop_(stop) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    return stop_ ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const std::atomic<bool>& stop_;
+};
+
+/// The problem as Ceres sees it; blocks keep their addresses.
+class Adjustment {
+ public:
+  explicit Adjustment(BundleProblem& bundle) : bundle_(bundle) {
+    for (const BundleKeyframe& keyframe : bundle.keyframes) {
+      poses_.push_back(Pack(keyframe.world_from_camera));
+    }
+    for (const BundlePoint& point : bundle.points) {
+      points_.push_back({0.0, 0.0, point.inverse_range});
+      bearings_.push_back({point.bearing, TangentBasis(point.bearing)});
+    }
+    AddResiduals();
+    Constrain();
+  }
+
+  bool Solve(const std::atomic<bool>& stop) {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::DENSE_SCHUR;
+    options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (PointBlock& point : points_) AddTo(*options.linear_solver_ordering, point.data(), 0);
+    for (PoseBlock& pose : poses_) AddTo(*options.linear_solver_ordering, pose.data(), 1);
+    options.max_num_iterations = bundle_.iterations;
+    options.function_tolerance = 1e-4;
+    options.num_threads = 1;
+    options.logging_type = ceres::SILENT;
+    Stopper stopper(stop);
+    options.callbacks.push_back(&stopper);
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    return summary.IsSolutionUsable() && summary.final_cost <= summary.initial_cost && !stop;
+  }
+
+  void Read() const {
+    const double scale = held_ ? ScaleChange() : 1.0;
+    const Eigen::Vector3d centre = bundle_.keyframes.front().world_from_camera.translation;
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      if (bundle_.keyframes[k].fixed) continue;
+      Rigid3& pose = bundle_.keyframes[k].world_from_camera;
+      pose = Unpack(poses_[k]);
+      pose.translation = centre + scale * (pose.translation - centre);
+    }
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      bundle_.points[k].bearing = bearings_[k](points_[k].data());
+      bundle_.points[k].inverse_range = points_[k][2] / scale;
+    }
+  }
+
+ private:
+  void AddTo(ceres::ParameterBlockOrdering& ordering, double* block, int group) const {
+    if (problem_.HasParameterBlock(block)) ordering.AddElementToGroup(block, group);
+  }
+
+  void AddResiduals() {
+    const auto loss = [] { return new ceres::CauchyLoss(kLossSigmas); };
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const BundlePoint& point = bundle_.points[k];
+      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<BirthCost, 3, 3>(new BirthCost{
+                                    RayError(point.seen, point.seen_sigma_rad), bearings_[k],
+                                    point.prior_inverse_range, point.prior_sigma}),
+                                nullptr, points_[k].data());
+    }
+    for (const BundleSighting& sighting : bundle_.sightings) {
+      const BundlePoint& point = bundle_.points[sighting.point];
+      problem_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<SightingCost, 2, 7, 7, 3>(new SightingCost{
+              RayError(sighting.ray, sighting.sigma_rad), bearings_[sighting.point]}),
+          loss(), poses_[sighting.keyframe].data(), poses_[point.anchor].data(),
+          points_[sighting.point].data());
+    }
+    for (const BundleKnownSighting& sighting : bundle_.known) {
+      problem_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<KnownCost, 2, 7>(
+              new KnownCost{RayError(sighting.ray, sighting.sigma_rad), sighting.point_in_world}),
+          loss(), poses_[sighting.keyframe].data());
+    }
+  }
+
+  void Constrain() {
+    using PoseManifold =
+        ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
+    int fixed = 0;
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      double* block = poses_[k].data();
+      if (!problem_.HasParameterBlock(block)) continue;
+      problem_.SetManifold(block, new PoseManifold);
+      if (!bundle_.keyframes[k].fixed) continue;
+      problem_.SetParameterBlockConstant(block);
+      ++fixed;
+    }
+    held_ = fixed < 2 && bundle_.known.empty();
+    if (held_ && fixed == 0 && problem_.HasParameterBlock(poses_.front().data())) {
+      problem_.SetParameterBlockConstant(poses_.front().data());
+    }
+  }
+
+  /// By how much lengths must be multiplied to keep the scale of the inverse ranges.
+  double ScaleChange() const {
+    double sum = 0.0, weight = 0.0;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const double before = bundle_.points[k].inverse_range, after = points_[k][2];
+      if (before <= 0.0 || after <= 0.0) continue;
+      const double parallax = bundle_.points[k].parallax_sigmas;
+      const double worth = parallax * parallax;
+      sum += worth * std::clamp(std::log(after / before), -1.0, 1.0);
+      weight += worth;
+    }
+    return weight > 0.0 ? std::exp(sum / weight) : 1.0;
+  }
+
+  BundleProblem& bundle_;
+  std::vector<PoseBlock> poses_;
+  std::vector<PointBlock> points_;
+  std::vector<BearingOf> bearings_;
+  ceres::Problem problem_;
+  bool held_ = false;  // place and scale by convention
+};
+
+}  // namespace
+
+bool AdjustBundle(BundleProblem& problem, const std::atomic<bool>& stop) {
+  if (problem.keyframes.size() < 3 || problem.points.empty()) return false;
+  Adjustment adjustment(problem);
+  if (!adjustment.Solve(stop)) return false;
+  adjustment.Read();
+  return true;
+}
+
+}  // namespace saccade

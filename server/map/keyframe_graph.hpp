@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "server/map/bundle_adjustment.hpp"
+#include "shared/scene/map_snapshot.hpp"
+
+namespace saccade {
+
+using KeyframeId = std::int64_t;
+
+/// What a keyframe saw.
+struct GraphSighting {
+  FeatureId id = 0;
+  Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();  // unit, in the camera at mid-exposure
+  double sigma_rad = 1e-3;
+  std::optional<Eigen::Vector3d> known_point;  // [m, world] of a target
+};
+
+/// A feature that a keyframe saw first.
+struct GraphBirth {
+  FeatureId id = 0;
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // unit, in the camera at mid-exposure
+  double sigma_rad = 1e-3;
+  double inverse_range = 1.0, inverse_range_sigma = 1.0;  // guessed [1/m]
+};
+
+/// An estimate of a feature, in its first keyframe.
+struct GraphEstimate {
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();
+  double inverse_range = 1.0;  // [1/m]
+};
+
+struct KeyframeGraphOptions {
+  int dense_keyframes = 40;       // the newest are all kept; before them, only those that are apart
+  double apart_share = 0.05;      // of the distance to what is in view
+  double apart_rad = 0.12;        // 7 deg
+  int max_keyframes = 600;        // then the oldest go
+  int adjusted_keyframes = 40;    // newest, and those that share most points with them
+  int held_keyframes = 20;        // around them, fixed
+  int max_points = 300;           // adjusted at once
+  double parallax_sigmas = 10.0;  // of a sighting's noise: less tells nothing of depth
+  int parallax_points = 15;       // with so much parallax, else nothing is adjusted
+};
+
+/// Keyframes and what they saw: the memory from which bundle adjustment draws (slam-spec 6).
+/// Values only; the tracker's thread owns it, a Job is a copy for another thread.
+class KeyframeGraph {
+ public:
+  explicit KeyframeGraph(const KeyframeGraphOptions& options) : options_(options) {}
+
+  void Clear();
+  std::size_t size() const { return keyframes_.size(); }
+  /// `distance_m`: typical, to what is in view.
+  KeyframeId Add(const Rigid3& world_from_camera, double distance_m,
+                 std::span<const GraphSighting> sightings, std::span<const GraphBirth> births);
+  /// The newest keyframe's pose; nothing if there is none.
+  std::optional<Rigid3> Newest() const;
+  std::optional<Rigid3> Pose(KeyframeId id) const;
+  void SetPose(KeyframeId id, const Rigid3& world_from_camera);
+  std::optional<GraphEstimate> Estimate(FeatureId id) const;
+
+  /// A problem around the newest keyframe, and what its indices mean.
+  struct Job {
+    BundleProblem problem;
+    std::vector<KeyframeId> keyframes;  // rising
+    std::vector<FeatureId> points;
+    KeyframeId newest = -1;
+  };
+  using Lookup = std::function<std::optional<GraphEstimate>(FeatureId)>;
+  /// `estimate`: a feature as the filter has it now, if it still does. Nothing while too few points
+  /// show parallax: a camera that only turns has nothing to adjust.
+  std::optional<Job> MakeJob(const Lookup& estimate) const;
+  /// Takes an adjusted job over; keyframes added meanwhile move along with the newest of the job.
+  void Take(const Job& job);
+
+ private:
+  struct Keyframe {
+    Rigid3 world_from_camera;
+    double distance_m = 1.0;
+    std::vector<GraphSighting> sightings;
+    std::vector<FeatureId> births;
+  };
+  struct Point {
+    KeyframeId anchor = 0;
+    GraphBirth birth;
+    GraphEstimate estimate;
+    std::vector<KeyframeId> seen_from;  // rising
+  };
+  using Ranked = std::vector<std::pair<int, KeyframeId>>;
+
+  void Thin();
+  void Erase(KeyframeId id);
+  /// Keyframes that see these points, most of them first.
+  Ranked WhoSees(std::span<const FeatureId> points) const;
+  std::vector<KeyframeId> Adjusted() const;
+  /// Of what they see, the points that two keyframes at least saw besides the first one.
+  std::vector<FeatureId> PointsOf(const std::vector<KeyframeId>& adjusted) const;
+  /// `adjusted`, the first keyframes of `points`, and others that see most of them.
+  void ChooseKeyframes(const std::vector<KeyframeId>& adjusted, Job& job) const;
+  void ChoosePoints(const Lookup& estimate, Job& job) const;
+  void AddSightings(Job& job) const;
+  bool ShowsParallax(BundleProblem& problem) const;
+
+  KeyframeGraphOptions options_;
+  std::map<KeyframeId, Keyframe> keyframes_;
+  std::unordered_map<FeatureId, Point> points_;
+  KeyframeId next_ = 0;
+};
+
+}  // namespace saccade

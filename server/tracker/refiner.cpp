@@ -1,0 +1,127 @@
+#include "server/tracker/refiner.hpp"
+
+#include <chrono>
+
+namespace saccade {
+namespace {
+
+constexpr double kKeyframeShare = 0.01;  // of the distance to what is in view
+constexpr double kKeyframeAngle_rad = 0.03;
+
+std::optional<GraphEstimate> EstimateOf(const FilterState& filter, FeatureId id) {
+  if (!filter.Has(id)) return std::nullopt;
+  const AnchoredPoint point = filter.Point(id);
+  return GraphEstimate{point.bearing, point.inverse_range};
+}
+
+}  // namespace
+
+Refiner::Refiner(const TrackerOptions& options)
+    : options_(options), graph_(KeyframeGraphOptions()) {}
+
+Refiner::~Refiner() { Stop(); }
+
+void Refiner::Stop() {
+  if (!running_.valid()) return;
+  stop_ = true;
+  running_.get();
+  stop_ = false;
+}
+
+void Refiner::Drop(FilterState& filter) {
+  Stop();
+  filter.DropMark();
+}
+
+void Refiner::Reset() {
+  Stop();
+  graph_.Clear();
+  clones_.clear();
+  fresh_ = false;
+  newest_feature_ = 0;
+}
+
+void Refiner::Keep(const CameraModel& camera, const FilterState& filter,
+                   const FrameMatches& matches, double inverse_range) {
+  if (!options_.adjust) return;
+  const double focal = 0.5 * (camera.intrinsics().fx + camera.intrinsics().fy);
+  std::vector<GraphBirth> births;
+  std::optional<AnchorPoseId> clone;
+  const std::vector<FeatureId> ids = filter.FeatureIds();
+  for (auto id = ids.rbegin(); id != ids.rend() && *id > newest_feature_; ++id) {
+    const AnchoredPoint point = filter.Point(*id);
+    births.push_back({*id, point.bearing, options_.pixel_sigma_px / focal, point.inverse_range,
+                      filter.Marginal(*id).inverse_range_sigma});
+    clone = filter.AnchorOf(*id);
+  }
+  const Rigid3& pose = filter.camera().world_from_camera;
+  const double distance = 1.0 / std::max(1e-6, inverse_range);
+  const auto newest = graph_.Newest();
+  fresh_ = !births.empty() || !newest ||
+           (newest->translation - pose.translation).norm() > kKeyframeShare * distance ||
+           RotationAngle(*newest, pose) > kKeyframeAngle_rad;
+  if (!fresh_) return;
+  std::vector<GraphSighting> sightings;
+  for (const LandmarkMatch& match : matches.in_view) {
+    if (!match.accepted()) continue;
+    const auto ray = camera.Unproject(match.pixel - match.row_shift);
+    if (!ray) continue;
+    GraphSighting sighting{match.id, ray->normalized(), std::sqrt(match.noise(0, 0)) / focal, {}};
+    if (const auto* known = std::get_if<Eigen::Vector3d>(&match.point)) {
+      sighting.known_point = *known;
+    }
+    sightings.push_back(sighting);
+  }
+  const KeyframeId id = graph_.Add(pose, distance, sightings, births);
+  if (clone) clones_[id] = *clone;
+  if (!ids.empty()) newest_feature_ = std::max(newest_feature_, ids.back());
+}
+
+void Refiner::Start(std::int64_t frame, FilterState& filter) {
+  if (!options_.adjust || !fresh_ || running_.valid()) return;
+  auto job = graph_.MakeJob([&](FeatureId id) { return EstimateOf(filter, id); });
+  if (!job) return;
+  started_ = frame;
+  filter.Mark();
+  running_ = std::async(std::launch::async, [this, job = *std::move(job)]() mutable {
+    std::optional<KeyframeGraph::Job> done;
+    if (AdjustBundle(job.problem, stop_)) done = std::move(job);
+    return done;
+  });
+}
+
+bool Refiner::Finish(std::int64_t frame, FilterState& filter) {
+  if (!running_.valid() || frame < started_ + options_.adjust_delay) return false;
+  if (options_.adjust_live &&
+      running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    return false;
+  }
+  const auto job = running_.get();
+  if (!job) {
+    filter.DropMark();
+    return false;
+  }
+  Put(*job, filter);
+  return true;
+}
+
+void Refiner::Put(const KeyframeGraph::Job& job, FilterState& filter) {
+  Refinement refinement;
+  graph_.Take(job);
+  for (const KeyframeId id : job.keyframes) {
+    const auto clone = clones_.find(id);
+    if (clone != clones_.end()) refinement.anchors[clone->second] = *graph_.Pose(id);
+  }
+  for (const FeatureId id : job.points) {
+    const GraphEstimate estimate = *graph_.Estimate(id);
+    refinement.features[id] = {estimate.bearing, estimate.inverse_range};
+  }
+  refinement.world_from_camera = *graph_.Pose(job.newest);
+  filter.Refine(refinement);
+  std::erase_if(clones_, [&](const auto& entry) { return !filter.HasAnchor(entry.second); });
+  for (auto it = clones_.upper_bound(job.newest); it != clones_.end(); ++it) {
+    graph_.SetPose(it->first, *filter.AnchorPose(it->second));
+  }
+}
+
+}  // namespace saccade

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <atomic>
+#include <future>
+#include <map>
+#include <optional>
+#include <span>
+
+#include "server/filter/filter_state.hpp"
+#include "server/map/keyframe_graph.hpp"
+#include "server/tracker/frame_matcher.hpp"
+#include "server/tracker/tracker_options.hpp"
+
+namespace saccade {
+
+/// Bundle adjustment beside the filter: keyframes are remembered, adjusted on another core, and
+/// what comes out is put into the filter a fixed number of frames later.
+///
+/// All calls from the tracker's thread; the adjustment itself runs on one of its own and sees a
+/// copy. A result is taken `adjust_delay` frames after its start; if it is not there yet, the
+/// offline evaluation waits for it (results repeat to the bit), the live server looks again in the
+/// next frame.
+class Refiner {
+ public:
+  explicit Refiner(const TrackerOptions& options);
+  ~Refiner();
+  Refiner(const Refiner&) = delete;
+  Refiner& operator=(const Refiner&) = delete;
+
+  /// Forgets everything; a running adjustment is stopped and dropped.
+  void Reset();
+  /// Drops a running adjustment: the camera was lost.
+  void Drop(FilterState& filter);
+  /// Remembers this frame, after its births and before anything else happens to the filter, if
+  /// features were born in it or the camera has moved enough.
+  void Keep(const CameraModel& camera, const FilterState& filter, const FrameMatches& matches,
+            double inverse_range);
+  /// Starts an adjustment if there is something new and none is running.
+  void Start(std::int64_t frame, FilterState& filter);
+  /// Puts a finished one into the filter. True: the map has moved.
+  bool Finish(std::int64_t frame, FilterState& filter);
+
+ private:
+  void Stop();
+  void Put(const KeyframeGraph::Job& job, FilterState& filter);
+
+  TrackerOptions options_;
+  KeyframeGraph graph_;
+  std::map<KeyframeId, AnchorPoseId> clones_;
+  FeatureId newest_feature_ = 0;  // that is known here
+  std::atomic<bool> stop_ = false;
+  std::future<std::optional<KeyframeGraph::Job>> running_;
+  std::int64_t started_ = 0;  // frame
+  bool fresh_ = false;        // the newest keyframe is the newest frame
+};
+
+}  // namespace saccade

@@ -1,0 +1,220 @@
+#include "server/map/bundle_adjustment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/map/keyframe_graph.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr double kSigma_rad = 0.3 / 500.0;
+
+/// A camera that moves along an arc and looks at points 1 to 4 m away.
+class Arc {
+ public:
+  Arc(int keyframes, int points, double length_m, std::uint64_t seed = 1) : random_(seed) {
+    for (int k = 0; k < keyframes; ++k) {
+      const double along = static_cast<double>(k) / (keyframes - 1);
+      poses_.push_back({ExpQuaternion({0.02 * along, -0.1 * along, 0.05 * along}),
+                        {length_m * along, 0.1 * length_m * std::sin(3.0 * along), 0.0}});
+    }
+    for (int k = 0; k < points; ++k) {
+      const double depth = Uniform(1.0, 4.0);
+      points_.emplace_back(depth * Uniform(-0.5, 0.5), depth * Uniform(-0.4, 0.4), depth);
+    }
+  }
+
+  double Uniform(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
+  Eigen::Vector3d Noise(double sigma) {
+    std::normal_distribution<double> normal(0.0, sigma);
+    return {normal(random_), normal(random_), normal(random_)};
+  }
+  Eigen::Vector3d Ray(int keyframe, int point, double noise_rad = kSigma_rad) {
+    return ((poses_[keyframe].Inverse() * points_[point]).normalized() + Noise(noise_rad))
+        .normalized();
+  }
+  const std::vector<Rigid3>& poses() const { return poses_; }
+  const std::vector<Eigen::Vector3d>& points() const { return points_; }
+
+  /// All points first seen by keyframe 0; poses and depths known badly.
+  BundleProblem Problem() {
+    BundleProblem problem;
+    problem.iterations = 30;
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      Rigid3 guess = poses_[k];
+      if (k > 0) {
+        guess.translation += Noise(0.02);
+        guess.rotation = guess.rotation * ExpQuaternion(Noise(0.01));
+      }
+      problem.keyframes.push_back({guess, false});
+    }
+    for (int k = 0; k < static_cast<int>(points_.size()); ++k) {
+      BundlePoint point;
+      point.bearing = point.seen = Ray(0, k);
+      point.seen_sigma_rad = kSigma_rad;
+      point.inverse_range = Uniform(0.8, 1.25) / points_[k].norm();
+      point.prior_inverse_range = point.prior_sigma = point.inverse_range;
+      point.parallax_sigmas = 100.0;
+      problem.points.push_back(point);
+      for (int from = 1; from < static_cast<int>(poses_.size()); ++from) {
+        problem.sightings.push_back({from, k, Ray(from, k), kSigma_rad});
+      }
+    }
+    return problem;
+  }
+
+  /// Largest error of a keyframe's place after the best scale about keyframe 0 [m].
+  double WorstPlace(const BundleProblem& problem, double scale) const {
+    double worst = 0.0;
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      worst = std::max(worst, (scale * problem.keyframes[k].world_from_camera.translation -
+                               poses_[k].translation)
+                                  .norm());
+    }
+    return worst;
+  }
+  double Scale(const BundleProblem& problem) const {
+    double product = 0.0, square = 0.0;
+    for (std::size_t k = 1; k < poses_.size(); ++k) {
+      const Eigen::Vector3d& at = problem.keyframes[k].world_from_camera.translation;
+      product += at.dot(poses_[k].translation);
+      square += at.squaredNorm();
+    }
+    return product / square;
+  }
+
+ private:
+  std::mt19937_64 random_;
+  std::vector<Rigid3> poses_;
+  std::vector<Eigen::Vector3d> points_;
+};
+
+TEST(BundleAdjustment, FindsPosesAndDepthsUpToScale) {
+  Arc arc(10, 60, 0.5);
+  BundleProblem problem = arc.Problem();
+  for (std::size_t k = 0; k < problem.sightings.size(); k += 23) {
+    problem.sightings[k].ray = (problem.sightings[k].ray + arc.Noise(0.05)).normalized();
+  }
+  double before = 0.0, after = 0.0;
+  for (const BundlePoint& point : problem.points) before += std::log(point.inverse_range);
+  ASSERT_TRUE(AdjustBundle(problem, false));
+  for (const BundlePoint& point : problem.points) after += std::log(point.inverse_range);
+  EXPECT_NEAR((after - before) / 60.0, 0.0, 0.01) << "the scale was not kept";
+  const double scale = arc.Scale(problem);
+  EXPECT_NEAR(scale, 1.0, 0.1);
+  EXPECT_LT(arc.WorstPlace(problem, scale), 0.003);  // 20 mm before
+  for (std::size_t k = 0; k < problem.points.size(); ++k) {
+    EXPECT_NEAR(scale / problem.points[k].inverse_range, arc.points()[k].norm(),
+                0.03 * arc.points()[k].norm());
+  }
+}
+
+TEST(BundleAdjustment, HoldsWhatIsFixed) {
+  Arc arc(10, 60, 0.5);
+  BundleProblem problem = arc.Problem();
+  for (const int k : {0, 9}) problem.keyframes[k] = {arc.poses()[k], true};
+  ASSERT_TRUE(AdjustBundle(problem, false));
+  EXPECT_EQ(problem.keyframes[9].world_from_camera.translation, arc.poses()[9].translation);
+  EXPECT_LT(arc.WorstPlace(problem, 1.0), 0.003);
+}
+
+TEST(BundleAdjustment, KnownPointsGiveMetres) {
+  Arc arc(10, 60, 0.5);
+  BundleProblem problem = arc.Problem();
+  for (BundlePoint& point : problem.points) point.inverse_range *= 1.3;
+  for (int k = 0; k < 10; ++k) {
+    for (int point = 0; point < 8; ++point) {
+      problem.known.push_back({k, arc.points()[point], arc.Ray(k, point), kSigma_rad});
+    }
+  }
+  ASSERT_TRUE(AdjustBundle(problem, false));
+  EXPECT_LT(arc.WorstPlace(problem, 1.0), 0.005);
+}
+
+TEST(BundleAdjustment, StopsAndChangesNothing) {
+  Arc arc(10, 60, 0.5);
+  BundleProblem problem = arc.Problem();
+  const Eigen::Vector3d before = problem.keyframes[5].world_from_camera.translation;
+  EXPECT_FALSE(AdjustBundle(problem, true));
+  EXPECT_EQ(problem.keyframes[5].world_from_camera.translation, before);
+  BundleProblem nothing;
+  EXPECT_FALSE(AdjustBundle(nothing, false));
+}
+
+/// Adds keyframes of an arc to a graph; the first gives birth to all points.
+void Fill(KeyframeGraph& graph, Arc& arc) {
+  for (int k = 0; k < static_cast<int>(arc.poses().size()); ++k) {
+    std::vector<GraphSighting> sightings;
+    std::vector<GraphBirth> births;
+    for (int point = 0; point < static_cast<int>(arc.points().size()); ++point) {
+      const FeatureId id = static_cast<FeatureId>(point) + 1;
+      if (k == 0) {
+        births.push_back({id, arc.Ray(0, point), kSigma_rad, 0.5, 0.25});
+      } else {
+        sightings.push_back({id, arc.Ray(k, point), kSigma_rad, {}});
+      }
+    }
+    graph.Add(arc.poses()[k], 2.0, sightings, births);
+  }
+}
+
+std::optional<GraphEstimate> Unknown(FeatureId) { return std::nullopt; }
+
+TEST(KeyframeGraph, MakesAJobThatAdjusts) {
+  KeyframeGraph graph{KeyframeGraphOptions()};
+  Arc arc(12, 60, 0.5);
+  Fill(graph, arc);
+  auto job = graph.MakeJob(Unknown);
+  ASSERT_TRUE(job.has_value());
+  EXPECT_EQ(job->keyframes.size(), 12u);
+  EXPECT_EQ(job->points.size(), 60u);
+  EXPECT_EQ(job->problem.sightings.size(), 11u * 60u);
+  ASSERT_TRUE(AdjustBundle(job->problem, false));
+  graph.Add(arc.poses()[11], 2.0, {}, {});
+  graph.Take(*job);
+  EXPECT_LT((graph.Pose(12)->translation - graph.Pose(11)->translation).norm(), 1e-9)
+      << "a keyframe added meanwhile moves along";
+  EXPECT_NE(graph.Estimate(7)->inverse_range, 0.5);
+}
+
+TEST(KeyframeGraph, ACameraThatOnlyTurnsHasNothingToAdjust) {
+  KeyframeGraph graph{KeyframeGraphOptions()};
+  Arc arc(12, 60, 0.002);
+  Fill(graph, arc);
+  EXPECT_FALSE(graph.MakeJob(Unknown).has_value());
+}
+
+TEST(KeyframeGraph, StaysSmallAndForgetsWhatItDropped) {
+  KeyframeGraphOptions options;
+  options.dense_keyframes = 10;
+  options.max_keyframes = 30;
+  KeyframeGraph graph(options);
+  for (int round = 0; round < 4; ++round) {
+    Arc arc(30, 20, 0.2, round + 1);
+    for (int k = 0; k < 30; ++k) {
+      std::vector<GraphSighting> sightings;
+      std::vector<GraphBirth> births;
+      for (int point = 0; point < 20; ++point) {
+        const FeatureId id = static_cast<FeatureId>(20 * round + point) + 1;
+        if (k == 0) {
+          births.push_back({id, arc.Ray(0, point), kSigma_rad, 0.5, 0.25});
+        } else {
+          sightings.push_back({id, arc.Ray(k, point), kSigma_rad, {}});
+        }
+      }
+      graph.Add(arc.poses()[k], 2.0, sightings, births);
+      EXPECT_LE(graph.size(), 30u);
+    }
+  }
+  EXPECT_LT(graph.size(), 25u) << "old keyframes close to each other stay";
+  const auto job = graph.MakeJob(Unknown);
+  ASSERT_TRUE(job.has_value());
+  for (const FeatureId id : job->points) EXPECT_GT(id, 40u) << "of a keyframe that shares nothing";
+}
+
+}  // namespace
+}  // namespace saccade
