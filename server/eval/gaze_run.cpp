@@ -112,7 +112,8 @@ absl::Status GazeRun::TakeFrame() {
   const Timestamp begin = MonotonicNow();
   const double cpu_begin_ms = ThreadCpuMs();
   newest_ = session_.track(frame);
-  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin), ThreadCpuMs() - cpu_begin_ms};
+  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin) - newest_->stage_ms.waited_ms,
+                          ThreadCpuMs() - cpu_begin_ms};
   ring_->Push({std::make_shared<const Frame>(frame), newest_});
   anchors_->Resolve(newest_, *frame.camera);
   Due due{.publish_ns = frame.capture_time_ns + Ns(options_.delay_s), .view = {}};

@@ -116,7 +116,8 @@ absl::Status PixelRun::Step(const Frame& frame, PixelRunTotals& totals) {
   const Timestamp begin = MonotonicNow();
   const double cpu_begin_ms = ThreadCpuMs();
   const std::shared_ptr<const MapSnapshot> snapshot = session_.track(frame);
-  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin), ThreadCpuMs() - cpu_begin_ms};
+  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin) - snapshot->stage_ms.waited_ms,
+                          ThreadCpuMs() - cpu_begin_ms};
   totals.frame_ms.Add(cost.wall_ms);
 
   const Rigid3 truth = source_->WorldFromCamera(frame.id);

@@ -131,6 +131,7 @@ absl::StatusOr<Mapped> MakeMap(const SimArguments& arguments) {
     }
     mapped.last = **std::move(frame);
   }
+  mapped.session.wait();
   if (mapped.path.empty()) {
     return absl::InvalidArgumentError(
         absl::StrCat("reloc: --duration must be above ", kStart_s, " s"));

@@ -34,7 +34,8 @@ absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const Tra
     const Timestamp begin = MonotonicNow();
     const double cpu_begin_ms = ThreadCpuMs();
     const std::shared_ptr<const MapSnapshot> snapshot = track(**frame);
-    const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin), ThreadCpuMs() - cpu_begin_ms};
+    const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin) - snapshot->stage_ms.waited_ms,
+                            ThreadCpuMs() - cpu_begin_ms};
     if (const absl::Status status = recorder->Add(**frame, *snapshot, cost); !status.ok()) {
       return status;
     }

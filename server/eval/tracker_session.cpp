@@ -32,6 +32,7 @@ absl::StatusOr<TrackerSession> MakeTrackerSession(const SourceInfo& info,
                            const Eigen::Vector2d& pixel, double depth_m, double sigma_m) {
     return tracker->SeedFeature(clicked_frame, world_from_camera, pixel, depth_m, sigma_m);
   };
+  session.wait = [tracker] { tracker->WaitForBackground(); };
   return session;
 }
 

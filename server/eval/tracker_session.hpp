@@ -12,6 +12,7 @@ namespace saccade {
 struct TrackerSession {
   TrackFunction track;
   SeedFeatureFunction seed;  // for AnchorManager
+  std::function<void()> wait;  // until nothing runs on other threads: before a fork
 };
 
 /// Creates the real tracker. Errors of options name the key and what it may be.

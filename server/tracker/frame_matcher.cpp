@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace saccade {
 namespace {
@@ -30,6 +31,26 @@ AnchoredPoint FromBirth(const Landmark& landmark,
   from.bearing = seen.normalized();
   from.inverse_range = 1.0 / seen.norm();
   return from;
+}
+
+/// A target is where it is said to be. If most of its points that were found are refused at once,
+/// the young map around them has agreed on a wrong pose (4 of 12 starts of the points simulation):
+/// then they keep a say.
+void HeedTarget(std::span<LandmarkMatch* const> found) {
+  constexpr double kSay = 0.5;
+  constexpr int kFewest = 4;  // fewer may well be false together
+  const auto known = [](const LandmarkMatch* match) {
+    return std::holds_alternative<Eigen::Vector3d>(match->point);
+  };
+  int total = 0, refused = 0;
+  for (const LandmarkMatch* match : found) {
+    total += known(match) ? 1 : 0;
+    refused += known(match) && !match->accepted() ? 1 : 0;
+  }
+  if (total < kFewest || 2 * refused <= total) return;
+  for (LandmarkMatch* match : found) {
+    if (known(match)) match->weight = std::max(match->weight, kSay);
+  }
 }
 
 /// Whether the picture has no texture around a pixel: a covered lens, a hand before it, a blank
@@ -184,6 +205,7 @@ RobustPose FrameMatcher::Solve(const CameraModel& camera, const PosePrior& prior
   robust.cutoff = options_.robust_cutoff;
   RobustPose pose = EstimateRobustPose(camera, prior, evidence, robust, random);
   for (std::size_t k = 0; k < used.size(); ++k) used[k]->weight = pose.weights[k];
+  HeedTarget(used);
   return pose;
 }
 

@@ -90,13 +90,21 @@ void Refiner::Start(std::int64_t frame, FilterState& filter) {
   });
 }
 
+void Refiner::Wait() const {
+  if (running_.valid()) running_.wait();
+}
+
 bool Refiner::Finish(std::int64_t frame, FilterState& filter) {
+  using Milliseconds = std::chrono::duration<double, std::milli>;
+  waited_ms_ = 0.0;
   if (!running_.valid() || frame < started_ + options_.adjust_delay) return false;
   if (options_.adjust_live &&
       running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
     return false;
   }
+  const auto from = std::chrono::steady_clock::now();
   const auto job = running_.get();
+  waited_ms_ = Milliseconds(std::chrono::steady_clock::now() - from).count();
   if (!job) {
     filter.DropMark();
     return false;

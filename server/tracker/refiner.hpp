@@ -39,6 +39,10 @@ class Refiner {
   void Start(std::int64_t frame, FilterState& filter);
   /// Puts a finished one into the filter. True: the map has moved.
   bool Finish(std::int64_t frame, FilterState& filter);
+  /// Returns when no adjustment is being computed any more.
+  void Wait() const;
+  /// What Finish() has waited in this frame [ms].
+  double waited_ms() const { return waited_ms_; }
 
  private:
   void Stop();
@@ -51,7 +55,8 @@ class Refiner {
   std::atomic<bool> stop_ = false;
   std::future<std::optional<KeyframeGraph::Job>> running_;
   std::int64_t started_ = 0;  // frame
-  bool fresh_ = false;        // the newest keyframe is the newest frame
+  double waited_ms_ = 0.0;
+  bool fresh_ = false;  // the newest keyframe is the newest frame
 };
 
 }  // namespace saccade

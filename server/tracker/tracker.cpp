@@ -18,6 +18,8 @@ std::shared_ptr<const MapSnapshot> Tracker::Track(const Frame& frame) {
   return impl_->Track(frame);
 }
 
+void Tracker::WaitForBackground() const { impl_->WaitForBackground(); }
+
 void Tracker::Reset() { impl_->Reset(); }
 
 absl::StatusOr<FeatureId> Tracker::SeedFeature(const Frame& clicked_frame,

@@ -30,6 +30,9 @@ class Tracker {
   /// last, or not of the camera's size, changes nothing but the snapshot's frame id.
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame);
 
+  /// Returns when nothing is being computed on other threads (for a process that forks).
+  void WaitForBackground() const;
+
   /// Throws the map away; the next frame starts anew (with the target, where there is one in view).
   void Reset();
 

@@ -96,7 +96,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   } else {
     Follow(frame, dt);
   }
-  times_.total_ms = total.Lap_ms();
+  times_.total_ms = total.Lap_ms() - times_.waited_ms;
   return Publish(frame, times_);
 }
 
@@ -195,7 +195,7 @@ void Tracker::Impl::Follow(const Frame& frame, double dt) {
     before_relocalisation_.reset();
     Manage(frame);
   }
-  times_.manage_ms = watch.Lap_ms();
+  times_.manage_ms = watch.Lap_ms() - times_.waited_ms;
 }
 
 /// The target leaves; what was seen of it in this frame stays as ordinary features, at the depth
@@ -239,6 +239,7 @@ void Tracker::Impl::Manage(const Frame& frame) {
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;
   if (refiner_.Finish(frames_, filter_)) ++revision_;
+  times_.waited_ms = refiner_.waited_ms();
   if (!telling || covered) return;
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,

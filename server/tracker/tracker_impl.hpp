@@ -20,6 +20,7 @@ class Tracker::Impl {
 
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame);
   void Reset();
+  void WaitForBackground() const { refiner_.Wait(); }
   absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame, const Rigid3& world_from_camera,
                                         const Eigen::Vector2d& pixel, double depth_prior_m,
                                         double depth_sigma_m);

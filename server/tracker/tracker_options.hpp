@@ -34,11 +34,11 @@ struct TrackerOptions {
   double robust_cutoff = 4.5;    // Mahalanobis distance from which a match is ignored
 
   // Search (slam-spec 5.1).
-  int first_stage = 20;         // features searched widely, for the robust pose
+  int first_stage = 20;          // features searched widely, for the robust pose
   int measured_per_frame = 100;  // 50 to 60 are enough, 100 safe (findings)
-  double gate_sigma = 3.0;      // half axis of the search ellipse: p = 0.989
-  double max_nssd = 0.40;       // NCC 0.80
-  int patch_px = 11;            // side of the compared patch
+  double gate_sigma = 3.0;       // half axis of the search ellipse: p = 0.989
+  double max_nssd = 0.40;        // NCC 0.80
+  int patch_px = 11;             // side of the compared patch
 
   // Map.
   int features_in_view = 80;         // new ones are started below

@@ -42,6 +42,9 @@ struct FeatureSnapshot {
 /// Wall-clock time of the tracker's stages for one frame [ms].
 struct StageTimes {
   double predict_ms = 0, search_ms = 0, update_ms = 0, manage_ms = 0, total_ms = 0;
+  /// For work on another core that is due at this frame; only offline, where frames come faster
+  /// than time passes. Not part of the total.
+  double waited_ms = 0;
 };
 
 /// Everything that readers may know of the map after one frame; immutable once published.
