@@ -16,6 +16,7 @@ FilterState::FilterState(const FilterOptions& options) : options_(options) {
 
 void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance) {
   mark_.reset();
+  head_ = HeadRate();
   camera_ = camera;
   first_pose_ = camera.world_from_camera;
   anchors_.clear();
@@ -34,6 +35,7 @@ void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance)
 
 void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covariance) {
   mark_.reset();
+  head_ = HeadRate();
   camera_ = camera;
   first_pose_ = camera.world_from_camera;
   covariance_.ReplaceBlock(0, covariance);
@@ -73,7 +75,40 @@ AnchoredPoint FilterState::Point(const Feature& feature, bool first) const {
 
 AnchoredPoint FilterState::Point(FeatureId id) const { return Point(*Find(id), false); }
 
-void FilterState::Predict(double dt, const MotionNoise& noise) {
+void FilterState::ChangeVelocities(const Eigen::Matrix<double, 6, 1>& by,
+                                   const Matrix6d& covariance) {
+  camera_.velocity_m_s += by.head<3>();
+  camera_.angular_velocity_rad_s += by.tail<3>();
+  covariance_.AddBlock(kPoseDim, covariance);
+}
+
+CameraMotion FilterState::WholeMotion() const {
+  CameraMotion whole = camera_;
+  if (head_) {
+    whole.velocity_m_s += head_->rate.head<3>();
+    whole.angular_velocity_rad_s += head_->rate.tail<3>();
+  }
+  return whole;
+}
+
+void FilterState::Predict(double dt, const MotionNoise& noise, const HeadMotion* head) {
+  const auto rate = [&]() {  // of the joints, seen from the present camera
+    Matrix6d turn = Matrix6d::Identity() / dt;
+    turn.topLeftCorner<3, 3>() = camera_.world_from_camera.RotationMatrix() / dt;
+    HeadRate now;
+    now.rate << head->camera_from_next.translation,
+        LogQuaternion(head->camera_from_next.rotation);  // its axis is the same before and after
+    now.rate = (turn * now.rate).eval();
+    now.covariance = turn * head->covariance * turn.transpose();
+    return now;
+  };
+  if (head != nullptr && !head_) {
+    head_ = rate();
+    ChangeVelocities(-head_->rate, head_->covariance);
+  } else if (head == nullptr && head_) {
+    ChangeVelocities(head_->rate, head_->covariance);
+    head_.reset();
+  }
   constexpr double kLongestStep_s = 1.0 / 30.0;
   const int steps = std::max(1, static_cast<int>(std::ceil(dt / kLongestStep_s - 0.1)));
   const double step = dt / steps;
@@ -86,6 +121,14 @@ void FilterState::Predict(double dt, const MotionNoise& noise) {
     camera_ = PropagateMotion(camera_, step);
     first_pose_ = camera_.world_from_camera;
   }
+  if (head == nullptr) return;
+  head_ = rate();
+  const MotionJacobians jacobians = LineariseHead(camera_, *head);
+  if (mark_) mark_->journal.Add(Journal::Predicted{jacobians.f});
+  covariance_.TransformBlock(0, jacobians.f);
+  covariance_.AddBlock(0, jacobians.q);
+  camera_ = TurnHead(camera_, head->camera_from_next);
+  first_pose_ = camera_.world_from_camera;
 }
 
 void FilterState::Inflate(const Matrix12d& extra) { covariance_.AddBlock(0, extra); }

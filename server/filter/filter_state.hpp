@@ -128,8 +128,13 @@ class FilterState {
   AnchoredPoint Point(FeatureId id) const;
   FeatureMarginal Marginal(FeatureId id) const;
 
-  /// Carries the camera `dt` seconds on, in steps of at most 1/30 s.
-  void Predict(double dt, const MotionNoise& noise);
+  /// Carries the camera `dt` seconds on, in steps of at most 1/30 s. `head`: what its joints did in
+  /// these `dt` seconds, if that is known; then camera()'s velocities are the wearer's alone
+  /// (README: head). Velocities given to Reset() and ResetCamera() are the wearer's wherever the
+  /// head is known.
+  void Predict(double dt, const MotionNoise& noise, const HeadMotion* head = nullptr);
+  /// camera(), with velocities that include what the joints do.
+  CameraMotion WholeMotion() const;
   /// Widens what is known of the camera's pose and velocities by P += `extra`.
   void Inflate(const Matrix12d& extra);
 
@@ -202,6 +207,7 @@ class FilterState {
   std::optional<PixelPrediction> Linearise(const CameraModel& camera, const Rigid3& pose,
                                            const Feature& feature) const;
   void RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size);
+  void ChangeVelocities(const Eigen::Matrix<double, 6, 1>& by, const Matrix6d& covariance);
   absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
                                           std::span<const Observation> observations,
                                           const Rigid3& linearisation,
@@ -241,6 +247,12 @@ class FilterState {
     Journal journal;
   };
   std::optional<Marked> mark_;
+  /// The joints' own part of the camera's velocities, which camera_ is without.
+  struct HeadRate {
+    Eigen::Matrix<double, 6, 1> rate = Eigen::Matrix<double, 6, 1>::Zero();
+    Matrix6d covariance = Matrix6d::Zero();
+  };
+  std::optional<HeadRate> head_;  // none: it was unknown, camera_'s velocities are whole
 
   FilterOptions options_;
   CameraMotion camera_;

@@ -59,4 +59,34 @@ MotionJacobians LineariseMotion(const CameraMotion& camera, const Quaterniond& f
   return result;
 }
 
+CameraMotion TurnHead(const CameraMotion& camera, const Rigid3& camera_from_next) {
+  const Vector3d& w = camera.angular_velocity_rad_s;
+  CameraMotion next;
+  next.world_from_camera = camera.world_from_camera * camera_from_next;
+  next.velocity_m_s = camera.velocity_m_s +
+                      camera.world_from_camera.rotation * w.cross(camera_from_next.translation);
+  next.angular_velocity_rad_s = camera_from_next.rotation.conjugate() * w;
+  return next;
+}
+
+MotionJacobians LineariseHead(const CameraMotion& camera, const HeadMotion& head) {
+  const Matrix3d r = camera.world_from_camera.RotationMatrix();
+  const Matrix3d back = head.camera_from_next.RotationMatrix().transpose();
+  const Vector3d& d = head.camera_from_next.translation;
+  const Vector3d& w = camera.angular_velocity_rad_s;
+  MotionJacobians result;
+  result.f.block<3, 3>(0, 3) = -r * Skew(d);
+  result.f.block<3, 3>(3, 3) = back;
+  result.f.block<3, 3>(6, 3) = -r * Skew(w.cross(d));
+  result.f.block<3, 3>(6, 9) = -r * Skew(d);
+  result.f.block<3, 3>(9, 9) = back;
+  Eigen::Matrix<double, 12, 6> g = Eigen::Matrix<double, 12, 6>::Zero();
+  g.block<3, 3>(0, 0) = r;
+  g.block<3, 3>(3, 3) = Matrix3d::Identity();
+  g.block<3, 3>(6, 0) = r * Skew(w);
+  g.block<3, 3>(9, 3) = Skew(back * w);
+  result.q.noalias() = g * head.covariance * g.transpose();
+  return result;
+}
+
 }  // namespace saccade

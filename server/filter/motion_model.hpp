@@ -44,4 +44,19 @@ MotionJacobians LineariseMotion(const CameraMotion& camera,
                                 const Eigen::Quaterniond& first_rotation, double dt,
                                 const MotionNoise& noise);
 
+/// What a mount's joints did to the camera in one step, by its encoders; the wearer's motion comes
+/// on top.
+struct HeadMotion {
+  /// Where the optic centre would have gone had the wearer stood still.
+  Rigid3 camera_from_next;
+  /// Of its errors [position, in the camera before; rotation, local in the camera after].
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+/// The camera after its joints have moved. The velocities, which are those of a camera whose joints
+/// stand still, go along: the same motion of the wearer, seen at the new place.
+CameraMotion TurnHead(const CameraMotion& camera, const Rigid3& camera_from_next);
+/// Its Jacobians; `q` is what the encoders' errors add.
+MotionJacobians LineariseHead(const CameraMotion& camera, const HeadMotion& head);
+
 }  // namespace saccade
