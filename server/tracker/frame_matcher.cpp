@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 
 namespace saccade {
@@ -16,7 +17,9 @@ SearchOptions MakeSearchOptions(const TrackerOptions& options) {
   search.gate_squared = options.gate_sigma * options.gate_sigma;
   search.max_sigma_px = kWidest_px;
   // Lucas-Kanade runs astray on blurred patches: fr1/xyz 0.8 cm with parabolas, up to 17 with it.
-  search.sub_pixel = SubPixel::kParabola;
+  search.sub_pixel = options.sub_pixel == 0   ? SubPixel::kNone
+                     : options.sub_pixel == 1 ? SubPixel::kParabola
+                                              : SubPixel::kLucasKanade;
   return search;
 }
 
@@ -51,6 +54,16 @@ void HeedTarget(std::span<LandmarkMatch* const> found) {
   for (LandmarkMatch* match : found) {
     if (known(match)) match->weight = std::max(match->weight, kSay);
   }
+}
+
+/// Of the ellipse that PatchSearcher looks at [px^2].
+double SearchedArea(const SearchOptions& options, const Eigen::Matrix2d& covariance) {
+  const Eigen::Array2d half_axes =
+      (options.gate_squared *
+       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues().array().max(0.0))
+          .sqrt()
+          .max(options.min_half_axis_px);
+  return std::numbers::pi * half_axes.prod();
 }
 
 /// Whether the picture has no texture around a pixel: a covered lens, a hand before it, a blank
@@ -168,9 +181,11 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   match.pixel = expected->pixel + match.row_shift;
   const Eigen::Vector2d centre = match.pixel;
   const AnchoredPoint birth = FromBirth(landmark, match.point);
-  const WarpStatus warped = WarpPatch(landmark.patch, pose.Inverse() * birth.world_from_anchor,
-                                      birth.bearing, std::max(0.0, birth.inverse_range),
-                                      Eigen::Vector3d::Zero(), camera, centre, warp_, warped_);
+  const WarpStatus warped =
+      options_.warp ? WarpPatch(landmark.patch, pose.Inverse() * birth.world_from_anchor,
+                                birth.bearing, std::max(0.0, birth.inverse_range),
+                                Eigen::Vector3d::Zero(), camera, centre, warp_, warped_)
+                    : CopyPatch(landmark.patch, warp_, warped_);
   if (warped != WarpStatus::kOk) return;  // not seen from here: no attempt
   const double sigma = PixelSigma(camera, expected->pixel);
   const Eigen::Matrix2d spread = expected->d_pose * pose_covariance * expected->d_pose.transpose() +
@@ -182,6 +197,7 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
       result.status == SearchStatus::kBadInput) {
     return;
   }
+  match.searched_px2 += SearchedArea(searcher_.options(), shrink * spread);
   match.found = result.found();
   // Where there is nothing at all, something hides the feature: no attempt (slam-spec 5.6).
   match.hidden = !match.found && IsBlank(pyramid.level(0), centre);
@@ -204,7 +220,9 @@ RobustPose FrameMatcher::Solve(const CameraModel& camera, const PosePrior& prior
   RobustPoseOptions robust;
   robust.cutoff = options_.robust_cutoff;
   RobustPose pose = EstimateRobustPose(camera, prior, evidence, robust, random);
-  for (std::size_t k = 0; k < used.size(); ++k) used[k]->weight = pose.weights[k];
+  for (std::size_t k = 0; k < used.size(); ++k) {
+    used[k]->weight = options_.robust ? pose.weights[k] : 1.0;
+  }
   HeedTarget(used);
   return pose;
 }
@@ -214,6 +232,7 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
                                  std::mt19937_64& random) {
   FrameMatches matches;
   const PosePrior prior{filter.camera().world_from_camera, filter.PoseCovariance()};
+  const CameraMotion motion = filter.WholeMotion();
   matches.in_view = Visible(camera, filter, map);
   std::vector<LandmarkMatch>& in_view = matches.in_view;
   const std::vector<int> order = Order(camera, in_view, map, random);
@@ -221,7 +240,7 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
   const int first = std::min(options_.first_stage, total);
   int searched = 0;
   for (int k = 0; k < first; ++k) {
-    Search(pyramid, camera, map, prior, prior.world_from_camera, prior.covariance, filter.camera(),
+    Search(pyramid, camera, map, prior, prior.world_from_camera, prior.covariance, motion,
            filter.readout_s(), in_view[order[k]]);
     searched += in_view[order[k]].searched ? 1 : 0;
   }
@@ -234,13 +253,14 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
   for (int k = 0; k < total; ++k) {
     LandmarkMatch& match = in_view[order[k]];
     if (match.accepted() || (match.searched && !known)) continue;
-    Search(pyramid, camera, map, prior, pose, spread, filter.camera(), filter.readout_s(), match);
+    Search(pyramid, camera, map, prior, pose, spread, motion, filter.readout_s(), match);
   }
   matches.pose = Solve(camera, prior, in_view, random);
   for (const LandmarkMatch& match : in_view) {
     matches.attempted += match.searched ? 1 : 0;
     matches.accepted += match.accepted() ? 1 : 0;
     matches.hidden += match.hidden ? 1 : 0;
+    matches.searched_px2 += match.searched_px2;
   }
   return matches;
 }

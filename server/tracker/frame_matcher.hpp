@@ -24,7 +24,8 @@ struct LandmarkMatch {
   Eigen::Vector2d row_shift = Eigen::Vector2d::Zero();
   Eigen::Vector2d d_readout = Eigen::Vector2d::Zero();  // row_shift / read-out time [px/s]
   Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();
-  double weight = 0.0;  // of the robust pose; 0: outlier or not found
+  double weight = 0.0;        // of the robust pose; 0: outlier or not found
+  double searched_px2 = 0.0;  // area of the ellipses in which it was sought
 
   bool accepted() const { return found && weight > 0.1; }
 };
@@ -35,7 +36,8 @@ struct FrameMatches {
   int attempted = 0;
   int accepted = 0;
   int hidden = 0;
-  bool surprised = false;  // few of the first stage agree: the camera moved unexpectedly
+  double searched_px2 = 0;  // area of all ellipses that were searched
+  bool surprised = false;   // few of the first stage agree: the camera moved unexpectedly
 };
 
 /// Finds the map in a picture: a few features widely, a robust pose from them, the rest narrowly

@@ -52,6 +52,15 @@ void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map
   const std::vector<FeatureId> unreliable = Unreliable(map, RetirementOptions());
   gone.insert(gone.end(), unreliable.begin(), unreliable.end());
   filter.Remove(unreliable);
+  if (options_.forget_after > 0) {
+    for (const Landmark& landmark : map.all()) {
+      if (!landmark.known && landmark.matched > 0 &&
+          landmark.last_matched_frame < frame - options_.forget_after) {
+        gone.push_back(landmark.id);
+      }
+    }
+    filter.Remove(gone);
+  }
   map.Remove(gone);
   const int excess = static_cast<int>(filter.feature_count()) - options_.max_features;
   if (excess > 0) {
@@ -98,7 +107,7 @@ std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vecto
   // As seen in mid-exposure: the row's own pose is turned by `late` from the clone's.
   const double late =
       filter.readout_s() * (std::clamp((pixel.y() + 0.5) / frame.camera->height(), 0.0, 1.0) - 0.5);
-  birth.bearing = ExpQuaternion(filter.camera().angular_velocity_rad_s * late) * *bearing;
+  birth.bearing = ExpQuaternion(filter.WholeMotion().angular_velocity_rad_s * late) * *bearing;
   birth.bearing_covariance = sigma * sigma * d_bearing * d_bearing.transpose();
   birth.inverse_range = depth.inverse_range;
   birth.inverse_range_sigma = depth.inverse_range_sigma;

@@ -24,7 +24,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
   snapshot->capture_time_ns = frame.capture_time_ns;
   snapshot->status = monitor_.status();
   snapshot->quality = monitor_.quality();
-  const CameraMotion& camera = filter_.camera();
+  const CameraMotion camera = filter_.WholeMotion();
   snapshot->advice = AdviceFor(monitor_, !started_ && starter_.waits_for_target(),
                                camera.angular_velocity_rad_s.norm(), matches_.accepted);
   snapshot->metric = metric_;
@@ -34,6 +34,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
   snapshot->angular_velocity_in_camera = camera.angular_velocity_rad_s;
   snapshot->attempted = matches_.attempted;
   snapshot->matched = matches_.accepted;
+  snapshot->searched_px2 = matches_.searched_px2;
   snapshot->map_revision = revision_;
   snapshot->map_generation = generation_;
   snapshot->stage_ms = times;

@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "server/tracker/encoder_motion.hpp"
 #include "server/tracker/recovery.hpp"
 
 namespace saccade {
@@ -86,6 +87,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   if (!usable || (has_frame_ && dt <= 0.0) || !pyramid_.Build(frame.grey).ok()) {
     return Publish(frame, times_);
   }
+  previous_mount_ = has_frame_ ? last_frame_.mount : std::nullopt;
   last_frame_ = frame;
   has_frame_ = true;
   if (!started_) {
@@ -142,19 +144,26 @@ bool Tracker::Impl::Settled() const {
 
 void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
   StopWatch watch;
-  const MotionNoise noise{options_.acceleration_sigma_m_s2,
-                          options_.angular_acceleration_sigma_rad_s2};
+  MotionNoise noise{options_.acceleration_sigma_m_s2, options_.angular_acceleration_sigma_rad_s2};
+  const MotionNoise wild{kSurprise * noise.acceleration_m_s2,
+                         kSurprise * noise.angular_acceleration_rad_s2};
+  std::optional<HeadMotion> head;
+  if (options_.encoders && source_.mount && previous_mount_ && last_frame_.mount) {
+    head = EncoderMotion(*source_.mount, *previous_mount_, *last_frame_.mount, dt, metric_);
+    noise = {options_.worn_acceleration_sigma_m_s2,
+             options_.worn_angular_acceleration_sigma_rad_s2};
+  }
   const CameraMotion before = filter_.camera();
   // Once: in a row of blind frames every widening would make the next search more hopeless.
   const bool followed = matches_.accepted >= options_.coasting_below;
-  filter_.Predict(dt, noise);
+  filter_.Predict(dt, noise, head ? &*head : nullptr);
   times_.predict_ms = watch.Lap_ms();
   matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
   if (matches_.surprised && followed) {
-    const MotionNoise wild{kSurprise * noise.acceleration_m_s2,
-                           kSurprise * noise.angular_acceleration_rad_s2};
     filter_.Inflate(LineariseMotion(before, before.world_from_camera.rotation, dt, wild).q);
+    const double searched_px2 = matches_.searched_px2;
     matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
+    matches_.searched_px2 += searched_px2;
   }
   times_.search_ms = watch.Lap_ms();
 }

@@ -55,6 +55,7 @@ class Tracker::Impl {
   ImagePyramid pyramid_;
 
   Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows
+  std::optional<MountAngles> previous_mount_;  // of the frame before it
   bool has_frame_ = false;
   bool started_ = false;
   bool metric_ = false;

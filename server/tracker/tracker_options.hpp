@@ -20,6 +20,10 @@ struct TrackerOptions {
   // Motion model M1 (slam-spec 3), profile `handheld` of SceneLib2.
   double acceleration_sigma_m_s2 = 4.0;
   double angular_acceleration_sigma_rad_s2 = 6.0;
+  // The same where encoders tell what the head does: only the wearer is left to be guessed.
+  bool encoders = true;  // use them
+  double worn_acceleration_sigma_m_s2 = 2.0;
+  double worn_angular_acceleration_sigma_rad_s2 = 3.0;
 
   // Filter.
   bool fej = false;                 // Jacobians at first estimates (slam-spec 1) always...
@@ -31,6 +35,7 @@ struct TrackerOptions {
   double readout_sigma_s = 0.015;
   double parallax_sigmas = 3.0;  // of a clone's matches, before they correct depth (T13)
   int carry_scale_after = 60;    // updates, before a change of scale is kept unobserved
+  bool robust = true;            // matches are weighted by the robust pose; false: gates only
   double robust_cutoff = 4.5;    // Mahalanobis distance from which a match is ignored
 
   // Search (slam-spec 5.1).
@@ -39,10 +44,13 @@ struct TrackerOptions {
   double gate_sigma = 3.0;       // half axis of the search ellipse: p = 0.989
   double max_nssd = 0.40;        // NCC 0.80
   int patch_px = 11;             // side of the compared patch
+  int sub_pixel = 1;             // 0: integer pixels, 1: parabola, 2: Lucas-Kanade
+  bool warp = true;              // patches are drawn as seen from here; false: as first seen
 
   // Map.
   int features_in_view = 80;         // new ones are started below
   int max_features = 250;            // in the filter; update time grows with the square
+  int forget_after = 0;              // frames out of sight, then a feature goes; 0: never
   int births_per_clone = 15;         // features that share one pose clone (slam-spec 5.4)
   double corner_min_score = 2000.0;  // see CornerOptions; plain walls must still give some
   double initial_depth_m = 1.0;      // of the first features without a target: sets the scale

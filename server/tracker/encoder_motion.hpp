@@ -1,0 +1,17 @@
+#pragma once
+
+#include "server/filter/motion_model.hpp"
+#include "server/mount/mount_model.hpp"
+
+namespace saccade {
+
+/// What the joints did to the camera from one frame to the next, `dt` seconds later, by its
+/// encoders' readings (README: head motion).
+///
+/// The covariance is that of two independent readings, each wrong by the encoders' sigma and by
+/// what the joint moves within the time stamps' error. `metric` false: the map's unit is unknown,
+/// so the optic centre's path (metres) is not used but added to what is uncertain.
+HeadMotion EncoderMotion(const MountModel& model, const MountAngles& before,
+                         const MountAngles& after, double dt, bool metric);
+
+}  // namespace saccade
