@@ -80,14 +80,18 @@ std::vector<DescribedPoint> DescribePixels(const cv::Mat& grey,
   return points;
 }
 
-int PointDistance(const DescribedPoint& a, const DescribedPoint& b) {
+int PointDistance(const DescribedPoint& a, const DescribedPoint& b, int limit) {
   constexpr std::array<std::array<int, 2>, 6> kPairs = {
       {{0, 0}, {1, 1}, {0, 1}, {1, 0}, {0, 2}, {2, 0}}};
+  const int half_limit = limit >= 256 ? 256 : limit / 2 + 12;  // 2.6 sigma of 128 bits at 85 / 256
   int least = 257;
   for (const auto& [s, t] : kPairs) {
-    if (a.present[s] && b.present[t]) {
-      least = std::min(least, HammingDistance(a.descriptors[s], b.descriptors[t]));
-    }
+    if (!a.present[s] || !b.present[t]) continue;
+    const Descriptor& x = a.descriptors[s];
+    const Descriptor& y = b.descriptors[t];
+    const int half = std::popcount(x[0] ^ y[0]) + std::popcount(x[1] ^ y[1]);
+    if (half > half_limit) continue;
+    least = std::min(least, half + std::popcount(x[2] ^ y[2]) + std::popcount(x[3] ^ y[3]));
   }
   return least;
 }

@@ -35,8 +35,9 @@ std::vector<DescribedPoint> DescribePixels(const cv::Mat& grey,
                                            std::span<const Eigen::Vector2d> pixels);
 
 /// Least distance between two places over the pairs of scales that a change of distance by up to
-/// kScaleStep^2 either way can bring together; 257 if they share none.
-int PointDistance(const DescribedPoint& a, const DescribedPoint& b);
+/// kScaleStep^2 either way can bring together; 257 if they share none. Where half the bits show
+/// that it is most probably beyond `limit`, 257 as well: several times as fast.
+int PointDistance(const DescribedPoint& a, const DescribedPoint& b, int limit = 256);
 
 /// The picture as 40 x 30 blurred pixels of zero mean and unit norm, CV_32FC1, 1 x 1200: the dot
 /// product of two is their correlation.

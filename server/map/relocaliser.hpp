@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/features/pose_fit.hpp"
+#include "server/map/keyframe_corners.hpp"
 #include "server/map/picture_description.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
@@ -22,6 +23,7 @@ namespace saccade {
 struct RelocaliserOptions {
   int max_keyframes = 100;  // beyond, the most redundant one is dropped
   int max_points = 500;     // of a keyframe
+  int scene_corners = 500;  // of a keyframe, looked for by Densify()
   int max_corners = 700;    // described in the queried picture
   int candidates = 8;       // keyframes tried in full, best thumbnails first
   double ratio = 0.75;      // best / second-best descriptor distance
@@ -58,8 +60,9 @@ struct Relocalisation {
 ///
 /// Each keyframe keeps a thumbnail and, for each map feature visible in it, ORB descriptors at
 /// several scales. A query matches them to corners of the picture, best thumbnails first, and
-/// accepts a pose that at least `min_inliers` features support. Memory: about 160 bytes a point
-/// and 5 KB a keyframe.
+/// accepts a pose that at least `min_inliers` features support; failing that, one that 18 features
+/// and corners of the keyframes' pictures support, which Densify() triangulates. Memory: about 160
+/// bytes a point or corner and 5 KB a keyframe, and its picture until Densify() was there.
 /// One thread (the tracker's).
 class Relocaliser {
  public:
@@ -82,6 +85,11 @@ class Relocaliser {
   std::optional<Relocalisation> Query(const cv::Mat& grey, const CameraModel& camera,
                                       const PointLookup& lookup = nullptr) const;
 
+  /// One step (a few ms) towards more points than the map's features: corners of the keyframes'
+  /// pictures, triangulated between them. They help to recognise a place and are never returned;
+  /// they move with their keyframe's features. False: nothing is left to do.
+  bool Densify(const CameraModel& camera, const PointLookup& lookup = nullptr);
+
   void Clear() { keyframes_.clear(); }
   std::size_t size() const { return keyframes_.size(); }
 
@@ -92,7 +100,17 @@ class Relocaliser {
     cv::Mat thumbnail;
     std::vector<KeyframePoint> points;
     std::vector<DescribedPoint> described;  // of points
+    cv::Mat grey;                           // until its corners are described
+    KeyframeCorners corners;
+    std::vector<FrameId> partners;  // keyframes its corners are yet to be matched to
   };
+  /// A feature or a corner of a keyframe, where it is now.
+  struct Known {
+    FeatureId id = 0;  // a corner: kCornerBit and its place
+    const DescribedPoint* look = nullptr;
+    Eigen::Vector3d point_in_world;
+  };
+  using Scene = std::vector<std::vector<Known>>;  // by keyframe
   struct Match {
     FeatureId id = 0;
     int corner = 0;  // into the picture's described corners
@@ -102,19 +120,32 @@ class Relocaliser {
   /// Keyframes most like the picture, best first, at most options.candidates.
   std::vector<int> Shortlist(const cv::Mat& thumbnail,
                              const std::vector<DescribedPoint>& corners) const;
-  std::vector<Match> MatchKeyframe(const Keyframe& keyframe,
-                                   const std::vector<DescribedPoint>& corners,
-                                   const PointLookup& lookup) const;
-  /// The pose that `matches` agree on, checked against the whole map; nothing if in doubt.
+  /// Where the keyframe was taken, by where its features are now; nothing if they disagree.
+  std::optional<Rigid3> PoseNow(const Keyframe& keyframe, const CameraModel& camera,
+                                const PointLookup& lookup) const;
+  std::vector<Known> KnownFeatures(const Keyframe& keyframe, const PointLookup& lookup) const;
+  void AppendCorners(int keyframe, const CameraModel& camera, const PointLookup& lookup,
+                     std::vector<Known>& known) const;
+  std::vector<Match> MatchKeyframe(const std::vector<Known>& known,
+                                   const std::vector<DescribedPoint>& corners) const;
+  /// The pose that `matches` agree on, checked against the whole scene; nothing if in doubt.
   std::optional<Relocalisation> Confirm(const std::vector<Match>& matches, FrameId keyframe,
                                         const CameraModel& camera,
                                         const std::vector<DescribedPoint>& corners,
-                                        const PointLookup& lookup) const;
-  /// Features of all keyframes that `pose` predicts near a corner of their look.
+                                        const Scene& scene, int min_inliers) const;
+  /// What `pose` predicts near a corner of its look.
   std::vector<Match> MatchGuided(const Rigid3& world_from_camera, const CameraModel& camera,
                                  const std::vector<DescribedPoint>& corners,
-                                 const PointLookup& lookup) const;
+                                 const Scene& scene) const;
   void DropMostRedundant();
+
+  void ChoosePartners(Keyframe& keyframe) const;
+  /// Each candidate's matches in turn, then all of them together.
+  std::optional<Relocalisation> TryCandidates(const std::vector<int>& candidates,
+                                              const Scene& scene, const CameraModel& camera,
+                                              const std::vector<DescribedPoint>& corners,
+                                              int min_inliers) const;
+  Keyframe* Find(FrameId frame);
 
   RelocaliserOptions options_;
   std::vector<Keyframe> keyframes_;

@@ -19,13 +19,27 @@ constexpr double kVelocityShare_1_s = 0.5;
 constexpr double kAngularVelocitySigma_rad_s = 1.0;
 constexpr double kFoundSigma_px = 1.5;
 
+/// Where the map's features are now.
+Relocaliser::PointLookup PointsNow(const LandmarkMap& map, const FilterState& filter) {
+  return [&map, &filter](FeatureId id) -> std::optional<Eigen::Vector3d> {
+    const Landmark* landmark = map.Find(id);
+    if (landmark == nullptr) return std::nullopt;
+    if (landmark->known) return landmark->known->point_in_world;
+    if (!filter.Has(id)) return std::nullopt;
+    return filter.Marginal(id).point_in_world;
+  };
+}
+
 }  // namespace
 
 void Tracker::Impl::KeepKeyframe(const Frame& frame) {
   if (monitor_.status() != TrackingStatus::kTracking) return;
   const Rigid3& pose = filter_.camera().world_from_camera;
   const double distance = kKeyframeShare / std::max(1e-6, depth_.inverse_range);
-  if (!relocaliser_.NeedsKeyframe(pose, distance, kKeyframeAngle_rad)) return;
+  if (!relocaliser_.NeedsKeyframe(pose, distance, kKeyframeAngle_rad)) {
+    relocaliser_.Densify(*frame.camera, PointsNow(map_, filter_));
+    return;
+  }
   std::vector<KeyframePoint> points;
   for (const LandmarkMatch& match : matches_.in_view) {
     if (!match.accepted()) continue;
@@ -46,14 +60,7 @@ void Tracker::Impl::KeepKeyframe(const Frame& frame) {
 void Tracker::Impl::Recover(const Frame& frame) {
   matches_ = FrameMatches();
   if (frames_lost_++ % kQueryEvery != 0) return;
-  const auto lookup = [this](FeatureId id) -> std::optional<Eigen::Vector3d> {
-    const Landmark* landmark = map_.Find(id);
-    if (landmark == nullptr) return std::nullopt;
-    if (landmark->known) return landmark->known->point_in_world;
-    if (!filter_.Has(id)) return std::nullopt;
-    return filter_.Marginal(id).point_in_world;
-  };
-  const auto found = relocaliser_.Query(frame.grey, *frame.camera, lookup);
+  const auto found = relocaliser_.Query(frame.grey, *frame.camera, PointsNow(map_, filter_));
   if (!found) return;
   before_relocalisation_ = std::make_shared<Backup>(Backup{filter_});
   if (!Accept(*found, *frame.camera)) {

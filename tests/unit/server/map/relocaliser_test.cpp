@@ -86,8 +86,19 @@ class RelocaliserOnDesk : public ::testing::Test {
           relocaliser_->AddKeyframe(frame, desk_.Image(frame), desk_.Truth(frame), map_[frame]);
       if (status.ok()) points_ += static_cast<int>(map_[frame].size());
     }
+    dense_ = std::make_unique<Relocaliser>(*relocaliser_);
+    for (bool more = true; more;) {
+      const auto start = std::chrono::steady_clock::now();
+      more = dense_->Densify(*camera_);
+      const std::chrono::duration<double, std::milli> took =
+          std::chrono::steady_clock::now() - start;
+      slowest_step_ms_ = std::max(slowest_step_ms_, took.count());
+    }
   }
-  static void TearDownTestSuite() { relocaliser_.reset(); }
+  static void TearDownTestSuite() {
+    relocaliser_.reset();
+    dense_.reset();
+  }
   void SetUp() override {
     if (!desk_.present()) GTEST_SKIP() << "needs ../shared/data/tum_fr1_xyz";
     ASSERT_GE(relocaliser_->size(), 6U);
@@ -95,6 +106,8 @@ class RelocaliserOnDesk : public ::testing::Test {
   static inline const Recording desk_{"tum_fr1_xyz"};
   static inline const std::shared_ptr<const CameraModel> camera_ = TumCamera();
   static inline std::unique_ptr<Relocaliser> relocaliser_;
+  static inline std::unique_ptr<Relocaliser> dense_;  // the same with corners
+  static inline double slowest_step_ms_ = 0;
   static inline std::map<int, std::vector<KeyframePoint>> map_;  // by keyframe
   static inline int points_ = 0;
 };
@@ -136,8 +149,59 @@ TEST_F(RelocaliserOnDesk, FindsFramesBetweenTheKeyframes) {
   EXPECT_LT(at(times, 0.5), 200.0);
 }
 
+TEST_F(RelocaliserOnDesk, CornersBesideTheFeaturesFindMore) {
+  int asked = 0, found = 0, without = 0;
+  double slowest_ms = 0;
+  for (int frame = 5; frame < desk_.size(); frame += 9) {
+    const cv::Mat image = desk_.Image(frame);
+    const auto start = std::chrono::steady_clock::now();
+    const auto result = dense_->Query(image, *camera_);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    slowest_ms = std::max(slowest_ms, took.count());
+    ++asked;
+    without += relocaliser_->Query(image, *camera_) ? 1 : 0;
+    if (!result) continue;
+    ++found;
+    const Rigid3 truth = desk_.Truth(frame);
+    EXPECT_LT((result->world_from_camera.translation - truth.translation).norm(), 0.10) << frame;
+    EXPECT_LT(RotationAngle(result->world_from_camera, truth), 5 * M_PI / 180) << frame;
+    // Only the map's own features are returned: the filter knows no others.
+    for (const Correspondence& c : result->inliers) {
+      const auto keyframe = map_.find(static_cast<int>(c.id / 1000));
+      ASSERT_NE(keyframe, map_.end()) << c.id;
+      EXPECT_TRUE(std::any_of(keyframe->second.begin(), keyframe->second.end(),
+                              [&](const KeyframePoint& p) { return p.id == c.id; }));
+    }
+  }
+  std::printf(
+      "with corners: %d of %d found, without %d; slowest query %.1f ms, slowest step %.1f\n", found,
+      asked, without, slowest_ms, slowest_step_ms_);
+  EXPECT_GT(found, without);
+  EXPECT_GE(found, asked * 0.95);
+}
+
+TEST_F(RelocaliserOnDesk, CornersMoveWithTheFeatures) {
+  const auto lookup = [&](FeatureId id) -> std::optional<Eigen::Vector3d> {
+    for (const KeyframePoint& p : map_[static_cast<int>(id / 1000)]) {
+      if (p.id == id) return p.point_in_world + Eigen::Vector3d(0.2, 0.1, 0);
+    }
+    return std::nullopt;
+  };
+  int found = 0;
+  for (int frame = 5; frame < desk_.size(); frame += 27) {
+    const auto result = dense_->Query(desk_.Image(frame), *camera_, lookup);
+    if (!result) continue;
+    ++found;
+    const Eigen::Vector3d expected = desk_.Truth(frame).translation + Eigen::Vector3d(0.2, 0.1, 0);
+    EXPECT_LT((result->world_from_camera.translation - expected).norm(), 0.10) << frame;
+  }
+  EXPECT_GE(found, 27);  // of 30
+  EXPECT_FALSE(dense_->Query(desk_.Image(322), *camera_, [](FeatureId) { return std::nullopt; }));
+}
+
 TEST_F(RelocaliserOnDesk, AcceptsNothingForeign) {
   int asked = 0;
+  std::vector<double> times;
   for (const char* name : {"hall_imu", "checkerboard", "davison_desk", "apriltag_corner"}) {
     const Recording other(name);
     for (int frame = 0; other.present() && frame < other.size(); frame += other.size() / 25) {
@@ -145,9 +209,16 @@ TEST_F(RelocaliserOnDesk, AcceptsNothingForeign) {
       cv::resize(other.Image(frame), image, cv::Size(640, 480));
       ++asked;
       EXPECT_FALSE(relocaliser_->Query(image, *camera_).has_value()) << name << " " << frame;
+      const auto start = std::chrono::steady_clock::now();
+      EXPECT_FALSE(dense_->Query(image, *camera_).has_value()) << name << " " << frame;
+      const std::chrono::duration<double, std::milli> took =
+          std::chrono::steady_clock::now() - start;
+      times.push_back(took.count());
     }
   }
-  std::printf("relocaliser: %d foreign pictures refused\n", asked);
+  std::sort(times.begin(), times.end());
+  std::printf("relocaliser: %d foreign pictures refused; with corners in %.1f ms (median), %.1f\n",
+              asked, times.empty() ? 0 : times[times.size() / 2], times.empty() ? 0 : times.back());
   EXPECT_GT(asked, 0);
 }
 

@@ -1,0 +1,162 @@
+// The keyframes of the relocaliser: stored, chosen, and filled with corners.
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/map/relocaliser.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr int kBorderPx = 20;
+constexpr int kPartners = 4;        // keyframes that a new one is triangulated with
+constexpr double kBaseline = 0.05;  // of the distance to what is in view, at least
+constexpr double kMisfit_px = 3.0;  // rms of a keyframe's features that still define its pose
+constexpr double kNear = 0.3, kFar = 3.0;  // of the distance to its features: ranges of corners
+
+double MedianRange(const Rigid3& world_from_camera, const std::vector<KeyframePoint>& points) {
+  std::vector<double> ranges;
+  for (const KeyframePoint& point : points) {
+    ranges.push_back((point.point_in_world - world_from_camera.translation).norm());
+  }
+  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
+  std::nth_element(ranges.begin(), middle, ranges.end());
+  return *middle;
+}
+
+/// Metres and radians into one number: 0.2 m count as much as 15 degrees.
+double ViewDistance(const Rigid3& a, const Rigid3& b) {
+  return (a.translation - b.translation).norm() / 0.2 + RotationAngle(a, b) / 0.26;
+}
+
+}  // namespace
+
+absl::Status Relocaliser::AddKeyframe(FrameId frame, const cv::Mat& grey,
+                                      const Rigid3& world_from_camera,
+                                      std::span<const KeyframePoint> points) {
+  if (grey.type() != CV_8UC1 || grey.cols < 64 || grey.rows < 64) {
+    return absl::InvalidArgumentError("keyframe: needs an 8-bit grey picture of 64 x 64 or more");
+  }
+  Keyframe keyframe;
+  keyframe.frame = frame;
+  keyframe.world_from_camera = world_from_camera;
+  const cv::Rect2d inside(kBorderPx, kBorderPx, grey.cols - 2 * kBorderPx,
+                          grey.rows - 2 * kBorderPx);
+  std::vector<Eigen::Vector2d> pixels;
+  for (const KeyframePoint& point : points) {
+    if (static_cast<int>(keyframe.points.size()) == options_.max_points) break;
+    if (!point.pixel.allFinite() || !point.point_in_world.allFinite() ||
+        !inside.contains({point.pixel.x(), point.pixel.y()})) {
+      continue;
+    }
+    keyframe.points.push_back(point);
+    pixels.push_back(point.pixel);
+  }
+  if (static_cast<int>(pixels.size()) < options_.min_inliers) {
+    return absl::InvalidArgumentError(absl::StrCat("keyframe ", frame, ": ", pixels.size(),
+                                                   " usable points, ", options_.min_inliers,
+                                                   " needed"));
+  }
+  keyframe.thumbnail = Thumbnail(grey);
+  keyframe.described = DescribePixels(grey, pixels);
+  keyframe.grey = grey.clone();
+  keyframes_.push_back(std::move(keyframe));
+  if (static_cast<int>(keyframes_.size()) > options_.max_keyframes) DropMostRedundant();
+  return absl::OkStatus();
+}
+
+void Relocaliser::DropMostRedundant() {
+  // The older of the two most alike; the newest stays, its points are the freshest.
+  std::size_t drop = 0;
+  double least = std::numeric_limits<double>::max();
+  for (std::size_t a = 0; a < keyframes_.size(); ++a) {
+    for (std::size_t b = a + 1; b < keyframes_.size(); ++b) {
+      const double distance =
+          ViewDistance(keyframes_[a].world_from_camera, keyframes_[b].world_from_camera);
+      if (distance < least) {
+        least = distance;
+        drop = a;
+      }
+    }
+  }
+  keyframes_.erase(keyframes_.begin() + static_cast<std::ptrdiff_t>(drop));
+}
+
+bool Relocaliser::NeedsKeyframe(const Rigid3& world_from_camera, double min_distance_m,
+                                double min_angle_rad) const {
+  return std::none_of(keyframes_.begin(), keyframes_.end(), [&](const Keyframe& k) {
+    return (k.world_from_camera.translation - world_from_camera.translation).norm() <
+               min_distance_m &&
+           RotationAngle(k.world_from_camera, world_from_camera) < min_angle_rad;
+  });
+}
+
+Relocaliser::Keyframe* Relocaliser::Find(FrameId frame) {
+  const auto at = std::find_if(keyframes_.begin(), keyframes_.end(),
+                               [frame](const Keyframe& k) { return k.frame == frame; });
+  return at == keyframes_.end() ? nullptr : &*at;
+}
+
+bool Relocaliser::Densify(const CameraModel& camera, const PointLookup& lookup) {
+  for (Keyframe& keyframe : keyframes_) {
+    if (!keyframe.grey.empty()) {
+      std::vector<Eigen::Vector2d> taken;
+      for (const DescribedPoint& point : keyframe.described) taken.push_back(point.pixel);
+      keyframe.corners = DescribeCorners(keyframe.grey, camera, taken, options_.scene_corners);
+      keyframe.grey.release();
+      ChoosePartners(keyframe);
+      return true;
+    }
+    if (keyframe.partners.empty()) continue;
+    Keyframe* partner = Find(keyframe.partners.back());
+    keyframe.partners.pop_back();
+    if (partner == nullptr) continue;
+    const auto here = PoseNow(keyframe, camera, lookup);
+    const auto there = PoseNow(*partner, camera, lookup);
+    if (!here || !there) return true;
+    const double range = MedianRange(keyframe.world_from_camera, keyframe.points);
+    TriangulateCorners(camera, {*here, &keyframe.corners}, {*there, &partner->corners},
+                       kNear * range, kFar * range);
+    return true;
+  }
+  return false;
+}
+
+void Relocaliser::ChoosePartners(Keyframe& keyframe) const {
+  const double range = MedianRange(keyframe.world_from_camera, keyframe.points);
+  std::vector<std::pair<double, FrameId>> others;
+  for (const Keyframe& other : keyframes_) {
+    if (other.frame == keyframe.frame || other.corners.described.empty()) continue;
+    const double baseline =
+        (other.world_from_camera.translation - keyframe.world_from_camera.translation).norm();
+    if (baseline < kBaseline * range) continue;
+    others.emplace_back(
+        baseline / range + RotationAngle(other.world_from_camera, keyframe.world_from_camera),
+        other.frame);
+  }
+  std::sort(others.begin(), others.end());
+  others.resize(std::min<std::size_t>(others.size(), kPartners));
+  for (const auto& [distance, frame] : others) keyframe.partners.push_back(frame);
+}
+
+std::optional<Rigid3> Relocaliser::PoseNow(const Keyframe& keyframe, const CameraModel& camera,
+                                           const PointLookup& lookup) const {
+  if (!lookup) return keyframe.world_from_camera;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> pixels;
+  for (const KeyframePoint& point : keyframe.points) {
+    const auto now = lookup(point.id);
+    if (!now || !now->allFinite()) continue;
+    points.push_back(*now);
+    pixels.push_back(point.pixel);
+  }
+  if (points.size() < 6) return std::nullopt;
+  const auto fit =
+      FitPose(camera, points, pixels, keyframe.world_from_camera, {.max_iterations = 8});
+  if (!fit.ok() || fit->rms_px > kMisfit_px) return std::nullopt;
+  return fit->world_from_camera;
+}
+
+}  // namespace saccade
