@@ -23,7 +23,7 @@ struct TrackerOptions {
   // The same where encoders tell what the head does: only the wearer is left to be guessed.
   bool encoders = true;  // use them
   double worn_acceleration_sigma_m_s2 = 2.0;
-  double worn_angular_acceleration_sigma_rad_s2 = 3.0;
+  double worn_angular_acceleration_sigma_rad_s2 = 2.0;  // a walking trunk
 
   // Filter.
   bool fej = false;                 // Jacobians at first estimates (slam-spec 1) always...
