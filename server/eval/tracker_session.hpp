@@ -11,7 +11,7 @@ namespace saccade {
 /// A tracker for one source, as evaluations use it.
 struct TrackerSession {
   TrackFunction track;
-  SeedFeatureFunction seed;  // for AnchorManager
+  SeedFeatureFunction seed;    // for AnchorManager
   std::function<void()> wait;  // until nothing runs on other threads: before a fork
 };
 

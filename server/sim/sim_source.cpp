@@ -102,8 +102,7 @@ HeadPath SimSource::PathOf(FrameId frame) {
   head_->AdvanceTo(middle + half);
   for (int k = 0; k < kHeadSamples; ++k) {
     const Timestamp at = middle - half + 2 * half * k / (kHeadSamples - 1);
-    path.shoulder_from_camera.push_back(
-        head_->true_model().MountFromCamera(head_->TrueAngles(at)));
+    path.shoulder_from_camera.push_back(head_->true_model().MountFromCamera(head_->TrueAngles(at)));
   }
   const std::lock_guard lock(heads_mutex_);
   heads_[frame] = head_->TrueAngles(middle);
