@@ -195,7 +195,8 @@ void KeyframeGraph::AddSightings(Job& job) const {
   }
 }
 
-bool KeyframeGraph::ShowsParallax(BundleProblem& problem) const {
+bool KeyframeGraph::ShowsParallax(Job& job) const {
+  BundleProblem& problem = job.problem;
   for (const BundleSighting& sighting : problem.sightings) {
     BundlePoint& point = problem.points[sighting.point];
     const Rigid3& anchor = problem.keyframes[point.anchor].world_from_camera;
@@ -206,10 +207,19 @@ bool KeyframeGraph::ShowsParallax(BundleProblem& problem) const {
     point.parallax_sigmas = std::max(point.parallax_sigmas,
                                      std::abs(point.inverse_range) * across / sighting.sigma_rad);
   }
-  const auto telling = std::count_if(
-      problem.points.begin(), problem.points.end(),
-      [&](const BundlePoint& point) { return point.parallax_sigmas > options_.parallax_sigmas; });
-  return telling >= options_.parallax_points;
+  std::vector<int> telling(problem.keyframes.size(), 0);
+  for (const BundleSighting& sighting : problem.sightings) {
+    const double parallax = problem.points[sighting.point].parallax_sigmas;
+    telling[sighting.keyframe] += parallax > options_.parallax_sigmas ? 1 : 0;
+  }
+  for (const BundlePoint& point : problem.points) {
+    telling[point.anchor] += point.parallax_sigmas > options_.parallax_sigmas ? 1 : 0;
+  }
+  for (const BundleKnownSighting& sighting : problem.known) ++telling[sighting.keyframe];
+  for (std::size_t k = 0; k < telling.size(); ++k) {
+    problem.keyframes[k].fixed |= telling[k] < options_.least_points;
+  }
+  return telling[IndexOf(job.keyframes, job.newest)] >= options_.parallax_points;
 }
 
 std::optional<KeyframeGraph::Job> KeyframeGraph::MakeJob(const Lookup& estimate) const {
@@ -221,7 +231,7 @@ std::optional<KeyframeGraph::Job> KeyframeGraph::MakeJob(const Lookup& estimate)
   ChooseKeyframes(adjusted, job);
   ChoosePoints(estimate, job);
   AddSightings(job);
-  if (!ShowsParallax(job.problem)) return std::nullopt;
+  if (!ShowsParallax(job)) return std::nullopt;
   return job;
 }
 

@@ -46,7 +46,8 @@ struct KeyframeGraphOptions {
   int held_keyframes = 20;        // around them, fixed
   int max_points = 300;           // adjusted at once
   double parallax_sigmas = 10.0;  // of a sighting's noise: less tells nothing of depth
-  int parallax_points = 15;       // with so much parallax, else nothing is adjusted
+  int parallax_points = 15;  // with so much parallax in the newest keyframe, else no adjustment
+  int least_points = 8;      // with so much parallax in a keyframe, else it is held
 };
 
 /// Keyframes and what they saw: the memory from which bundle adjustment draws (slam-spec 6).
@@ -106,7 +107,9 @@ class KeyframeGraph {
   void ChooseKeyframes(const std::vector<KeyframeId>& adjusted, Job& job) const;
   void ChoosePoints(const Lookup& estimate, Job& job) const;
   void AddSightings(Job& job) const;
-  bool ShowsParallax(BundleProblem& problem) const;
+  /// Whether enough points of the newest keyframe show parallax; keyframes that see few of those
+  /// are held: where depth is only guessed, a turn and a sideways step look alike.
+  bool ShowsParallax(Job& job) const;
 
   KeyframeGraphOptions options_;
   std::map<KeyframeId, Keyframe> keyframes_;
