@@ -63,7 +63,7 @@ TEST_F(SaccadeEval, FailureExitsWithOneAndNamesTheThing) {
   fails("run --dataset /nowhere --out /tmp/x", "/nowhere: no such folder");
   fails("run --dataset /nowhere --out /tmp/x --frames 5:2", "--frames '5:2'");
   fails("score --estimate /nowhere.tum --truth /nowhere.tum", "/nowhere.tum: cannot be opened");
-  fails("sim --scenario dance --out /tmp/x", "'dance' is unknown; use one of points, desk");
+  fails("sim --scenario dance --out /tmp/x", "'dance' is unknown; use one of points");
 }
 
 TEST_F(SaccadeEval, ScorePrintsJson) {
