@@ -13,15 +13,7 @@ absl::StatusOr<TrackerSession> MakeTrackerSession(const SourceInfo& info,
     if (const absl::Status status = options.LoadToml(arguments.config); !status.ok()) return status;
   }
   for (const std::string& pair : arguments.set) {
-    const std::size_t equals = pair.find('=');
-    if (equals == std::string::npos || equals == 0) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("--set '", pair, "' is not key=value, for example --set seed=2"));
-    }
-    const absl::Status status = options.Set(pair.substr(0, equals), pair.substr(equals + 1));
-    if (!status.ok()) {
-      return absl::Status(status.code(), absl::StrCat("--set ", pair, ": ", status.message()));
-    }
+    if (const absl::Status status = options.SetPair(pair); !status.ok()) return status;
   }
   absl::StatusOr<std::unique_ptr<Tracker>> created = Tracker::Create(info, options);
   if (!created.ok()) return created.status();

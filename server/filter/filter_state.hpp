@@ -164,7 +164,7 @@ class FilterState {
 
   /// The clone that a feature hangs on. `id` must exist.
   AnchorPoseId AnchorOf(FeatureId id) const { return Find(id)->anchor; }
-  bool HasAnchor(AnchorPoseId id) const;
+  /// Nothing if it is not in the state any more.
   std::optional<Rigid3> AnchorPose(AnchorPoseId id) const;
   /// Remembers the present estimates, and from now on what happens to their errors.
   void Mark();

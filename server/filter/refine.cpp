@@ -1,4 +1,5 @@
 // The part of FilterState that takes over better estimates (bundle adjustment).
+#include <algorithm>
 #include <cmath>
 
 #include "server/filter/filter_state.hpp"
@@ -24,13 +25,11 @@ Eigen::Matrix<double, 6, 1> PoseStep(const Rigid3& from, const Rigid3& to) {
 
 }  // namespace
 
-bool FilterState::HasAnchor(AnchorPoseId id) const { return AnchorPose(id).has_value(); }
-
 std::optional<Rigid3> FilterState::AnchorPose(AnchorPoseId id) const {
-  for (const Anchor& anchor : anchors_) {
-    if (anchor.id == id) return anchor.pose;
-  }
-  return std::nullopt;
+  const auto at = std::lower_bound(anchors_.begin(), anchors_.end(), id,
+                                   [](const Anchor& a, AnchorPoseId key) { return a.id < key; });
+  if (at == anchors_.end() || at->id != id) return std::nullopt;
+  return at->pose;
 }
 
 void FilterState::Mark() {

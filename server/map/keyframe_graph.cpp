@@ -87,12 +87,6 @@ void KeyframeGraph::SetPose(KeyframeId id, const Rigid3& world_from_camera) {
   if (at != keyframes_.end()) at->second.world_from_camera = world_from_camera;
 }
 
-std::optional<GraphEstimate> KeyframeGraph::Estimate(FeatureId id) const {
-  const auto at = points_.find(id);
-  if (at == points_.end()) return std::nullopt;
-  return at->second.estimate;
-}
-
 KeyframeGraph::Ranked KeyframeGraph::WhoSees(std::span<const FeatureId> points) const {
   const KeyframeId first = keyframes_.begin()->first;
   std::vector<int> counts(static_cast<std::size_t>(next_ - first), 0);

@@ -42,8 +42,8 @@ struct KeyframeGraphOptions {
   double apart_share = 0.05;      // of the distance to what is in view
   double apart_rad = 0.12;        // 7 deg
   int max_keyframes = 600;        // then the oldest go
-  int adjusted_keyframes = 40;    // newest, and those that share most points with them
-  int held_keyframes = 20;        // around them, fixed
+  int adjusted_keyframes = 30;    // newest, and those that share most points with them
+  int held_keyframes = 15;        // around them, fixed
   int max_points = 300;           // adjusted at once
   double parallax_sigmas = 10.0;  // of a sighting's noise: less tells nothing of depth
   int parallax_points = 15;  // with so much parallax in the newest keyframe, else no adjustment
@@ -65,7 +65,6 @@ class KeyframeGraph {
   std::optional<Rigid3> Newest() const;
   std::optional<Rigid3> Pose(KeyframeId id) const;
   void SetPose(KeyframeId id, const Rigid3& world_from_camera);
-  std::optional<GraphEstimate> Estimate(FeatureId id) const;
 
   /// A problem around the newest keyframe, and what its indices mean.
   struct Job {

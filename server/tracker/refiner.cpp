@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "server/pipeline/stop_watch.hpp"
+
 namespace saccade {
 namespace {
 
@@ -95,16 +97,15 @@ void Refiner::Wait() const {
 }
 
 bool Refiner::Finish(std::int64_t frame, FilterState& filter) {
-  using Milliseconds = std::chrono::duration<double, std::milli>;
   waited_ms_ = 0.0;
   if (!running_.valid() || frame < started_ + options_.adjust_delay) return false;
   if (options_.adjust_live &&
       running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
     return false;
   }
-  const auto from = std::chrono::steady_clock::now();
+  StopWatch watch;
   const auto job = running_.get();
-  waited_ms_ = Milliseconds(std::chrono::steady_clock::now() - from).count();
+  waited_ms_ = watch.Lap_ms();
   if (!job) {
     filter.DropMark();
     return false;
@@ -114,19 +115,21 @@ bool Refiner::Finish(std::int64_t frame, FilterState& filter) {
 }
 
 void Refiner::Put(const KeyframeGraph::Job& job, FilterState& filter) {
-  Refinement refinement;
   graph_.Take(job);
-  for (const KeyframeId id : job.keyframes) {
-    const auto clone = clones_.find(id);
-    if (clone != clones_.end()) refinement.anchors[clone->second] = *graph_.Pose(id);
+  // From the job: the graph may have dropped some of it since.
+  Refinement refinement;
+  for (std::size_t k = 0; k < job.keyframes.size(); ++k) {
+    const Rigid3& pose = job.problem.keyframes[k].world_from_camera;
+    const auto clone = clones_.find(job.keyframes[k]);
+    if (clone != clones_.end()) refinement.anchors[clone->second] = pose;
+    if (job.keyframes[k] == job.newest) refinement.world_from_camera = pose;
   }
-  for (const FeatureId id : job.points) {
-    const GraphEstimate estimate = *graph_.Estimate(id);
-    refinement.features[id] = {estimate.bearing, estimate.inverse_range};
+  for (std::size_t k = 0; k < job.points.size(); ++k) {
+    const BundlePoint& point = job.problem.points[k];
+    refinement.features[job.points[k]] = {point.bearing, point.inverse_range};
   }
-  refinement.world_from_camera = *graph_.Pose(job.newest);
   filter.Refine(refinement);
-  std::erase_if(clones_, [&](const auto& entry) { return !filter.HasAnchor(entry.second); });
+  std::erase_if(clones_, [&](const auto& entry) { return !filter.AnchorPose(entry.second); });
   for (auto it = clones_.upper_bound(job.newest); it != clones_.end(); ++it) {
     graph_.SetPose(it->first, *filter.AnchorPose(it->second));
   }

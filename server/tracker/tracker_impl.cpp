@@ -1,7 +1,6 @@
 #include "server/tracker/tracker_impl.hpp"
 
-#include <chrono>
-
+#include "server/pipeline/stop_watch.hpp"
 #include "server/tracker/encoder_motion.hpp"
 #include "server/tracker/recovery.hpp"
 
@@ -13,19 +12,6 @@ constexpr int kLongestSettling = 15;    // frames: under pure rotation depth nev
 constexpr double kSettledDepth = 0.25;  // sigma / inverse range
 constexpr int kFewestToUpdate = 3;      // matches: fewer can agree by chance
 constexpr double kSurprise = 3.0;       // times the motion noise, after an unexpected move
-
-class StopWatch {
- public:
-  double Lap_ms() {
-    const auto now = std::chrono::steady_clock::now();
-    const double lap = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-    return lap;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 /// The camera's own word on its shutter, else the filter finds out.
 FilterOptions MakeFilterOptions(const TrackerOptions& options, const CameraModel& camera) {
@@ -89,6 +75,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   }
   previous_mount_ = has_frame_ ? last_frame_.mount : std::nullopt;
   last_frame_ = frame;
+  if (last_frame_.mount && !ToVector(*last_frame_.mount).allFinite()) last_frame_.mount.reset();
   has_frame_ = true;
   if (!started_) {
     Begin(frame);

@@ -132,6 +132,17 @@ absl::Status TrackerOptions::Set(absl::string_view key_name, absl::string_view v
   return absl::OkStatus();
 }
 
+absl::Status TrackerOptions::SetPair(absl::string_view pair) {
+  const std::size_t equals = pair.find('=');
+  if (equals == absl::string_view::npos || equals == 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--set '", pair, "' is not key=value, for example --set seed=2"));
+  }
+  const absl::Status status = Set(pair.substr(0, equals), pair.substr(equals + 1));
+  if (status.ok()) return status;
+  return absl::Status(status.code(), absl::StrCat("--set ", pair, ": ", status.message()));
+}
+
 absl::Status TrackerOptions::LoadToml(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) {
     return absl::NotFoundError(absl::StrCat(file.string(), ": no such file"));

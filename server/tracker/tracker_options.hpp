@@ -70,6 +70,8 @@ struct TrackerOptions {
   absl::Status Validate() const;
   /// `--set key=value`. InvalidArgument: unknown key (all known ones are listed) or not a value.
   absl::Status Set(absl::string_view key, absl::string_view value);
+  /// The same from "key=value"; the error says which pair.
+  absl::Status SetPair(absl::string_view pair);
   /// Reads the [tracker] table of a TOML file over the present values.
   ///   NotFound         no such file
   ///   InvalidArgument  not TOML, unknown key, wrong type: names file and key

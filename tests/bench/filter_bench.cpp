@@ -65,9 +65,9 @@ class FilterRun {
   absl::Status Step(std::array<double, kStages>& ms) {
     truth_ = Sway(kFrame_s * ++frame_);
     const std::vector<Observation> seen = See();
-    Laps laps;
+    StopWatch watch;
     filter_.Predict(kFrame_s, MotionNoise());
-    ms[kPredict] = laps.Next_ms();
+    ms[kPredict] = watch.Lap_ms();
     std::vector<PoseEvidence> evidence;
     evidence.reserve(seen.size());
     for (const Observation& each : seen) {
@@ -75,13 +75,13 @@ class FilterRun {
       if (!predicted) return absl::InternalError("bench filter: a feature left the view");
       evidence.push_back({filter_.Point(each.id), *predicted, each.pixel, each.noise});
     }
-    ms[kPredictions] = laps.Next_ms();
+    ms[kPredictions] = watch.Lap_ms();
     const PosePrior prior = {filter_.camera().world_from_camera, filter_.PoseCovariance()};
     const RobustPose pose =
         EstimateRobustPose(lens_, prior, evidence, RobustPoseOptions(), random_);
-    ms[kRobustPose] = laps.Next_ms();
+    ms[kRobustPose] = watch.Lap_ms();
     const auto report = filter_.Update(lens_, seen, pose.world_from_camera);
-    ms[kUpdate] = laps.Next_ms();
+    ms[kUpdate] = watch.Lap_ms();
     ms[kAll] = ms[kPredict] + ms[kPredictions] + ms[kRobustPose] + ms[kUpdate];
     if (!report.ok()) return report.status();
     return Birth();

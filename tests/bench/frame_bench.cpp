@@ -30,15 +30,7 @@ absl::StatusOr<TrackerOptions> ReadOptions(const FrameBenchArguments& arguments)
     if (const absl::Status status = options.LoadToml(arguments.config); !status.ok()) return status;
   }
   for (const std::string& pair : arguments.set) {
-    const std::size_t equals = pair.find('=');
-    if (equals == std::string::npos || equals == 0) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("--set '", pair, "' is not key=value, for example --set seed=2"));
-    }
-    const absl::Status status = options.Set(pair.substr(0, equals), pair.substr(equals + 1));
-    if (!status.ok()) {
-      return absl::Status(status.code(), absl::StrCat("--set ", pair, ": ", status.message()));
-    }
+    if (const absl::Status status = options.SetPair(pair); !status.ok()) return status;
   }
   return options;
 }
@@ -67,9 +59,9 @@ absl::StatusOr<Outcome> RunOnce(const SourceInfo& info, const TrackerOptions& op
   if (!tracker.ok()) return tracker.status();
   Outcome outcome;
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    Laps laps;
+    StopWatch watch;
     const std::shared_ptr<const MapSnapshot> snapshot = (*tracker)->Track(frames[k]);
-    least[kWhole].Add(k, laps.Next_ms() - snapshot->stage_ms.waited_ms);
+    least[kWhole].Add(k, watch.Lap_ms() - snapshot->stage_ms.waited_ms);
     least[kPredict].Add(k, snapshot->stage_ms.predict_ms);
     least[kSearch].Add(k, snapshot->stage_ms.search_ms);
     least[kUpdate].Add(k, snapshot->stage_ms.update_ms);

@@ -14,9 +14,9 @@ Sample Time(std::size_t items, int repeats, const std::function<void(std::size_t
   LeastTimes least;
   for (int k = 0; k < repeats; ++k) {
     for (std::size_t item = 0; item < items; ++item) {
-      Laps laps;
+      StopWatch watch;
       work(item);
-      least.Add(item, laps.Next_ms());
+      least.Add(item, watch.Lap_ms());
     }
   }
   return least.ToSample();

@@ -1,27 +1,13 @@
 #pragma once
 
-#include <chrono>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "server/eval/statistics.hpp"
+#include "server/pipeline/stop_watch.hpp"
 
 namespace saccade {
-
-/// Lap times of one thread [ms].
-class Laps {
- public:
-  double Next_ms() {
-    const auto now = std::chrono::steady_clock::now();
-    const double lap = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-    return lap;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 /// The least time of each item over several runs of the same work: what it costs on this machine
 /// when nobody else is at it.

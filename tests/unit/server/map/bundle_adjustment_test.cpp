@@ -174,11 +174,43 @@ TEST(KeyframeGraph, MakesAJobThatAdjusts) {
   EXPECT_EQ(job->points.size(), 60u);
   EXPECT_EQ(job->problem.sightings.size(), 11u * 60u);
   ASSERT_TRUE(AdjustBundle(job->problem, false));
-  graph.Add(arc.poses()[11], 2.0, {}, {});
+  std::vector<GraphSighting> sightings;
+  for (int point = 0; point < 60; ++point) {
+    sightings.push_back({static_cast<FeatureId>(point) + 1, arc.Ray(11, point), kSigma_rad, {}});
+  }
+  graph.Add(arc.poses()[11], 2.0, sightings, {});
   graph.Take(*job);
   EXPECT_LT((graph.Pose(12)->translation - graph.Pose(11)->translation).norm(), 1e-9)
       << "a keyframe added meanwhile moves along";
-  EXPECT_NE(graph.Estimate(7)->inverse_range, 0.5);
+  const auto next = graph.MakeJob(Unknown);
+  ASSERT_TRUE(next.has_value());
+  EXPECT_NE(next->problem.points.front().inverse_range, 0.5) << "what was found is not taken over";
+}
+
+TEST(BundleAdjustment, LeavesOutWhatIsBehindACamera) {
+  Arc arc(10, 60, 0.5);
+  BundleProblem problem = arc.Problem();
+  for (const int k : {0, 9}) problem.keyframes[k] = {arc.poses()[k], true};
+  problem.sightings[40].ray = -problem.sightings[40].ray;
+  problem.known.push_back({3, {0.0, 0.0, -2.0}, Eigen::Vector3d::UnitZ(), kSigma_rad});
+  ASSERT_TRUE(AdjustBundle(problem, false));
+  EXPECT_LT(arc.WorstPlace(problem, 1.0), 0.003);
+}
+
+TEST(KeyframeGraph, AJobOutlivesWhatItWasMadeOf) {
+  KeyframeGraphOptions options;
+  options.dense_keyframes = 12;
+  options.max_keyframes = 12;
+  KeyframeGraph graph(options);
+  Arc arc(12, 60, 0.5);
+  Fill(graph, arc);
+  auto job = graph.MakeJob(Unknown);
+  ASSERT_TRUE(job.has_value());
+  ASSERT_TRUE(AdjustBundle(job->problem, false));
+  for (int k = 0; k < 20; ++k) graph.Add(arc.poses()[11], 2.0, {}, {});
+  EXPECT_FALSE(graph.Pose(job->newest).has_value());
+  graph.Take(*job);  // nothing of it is left
+  EXPECT_EQ(graph.size(), 12u);
 }
 
 TEST(KeyframeGraph, ACameraThatOnlyTurnsHasNothingToAdjust) {
