@@ -18,6 +18,7 @@ void FrameRing::Push(PastFrame past) {
   const std::lock_guard lock(mutex_);
   if (!frames_.empty() && past.frame->id <= frames_.back().frame->id) {
     frames_.clear();
+    held_.clear();
     bytes_ = 0;
     colored_from_ = 0;
   }
@@ -48,6 +49,9 @@ void FrameRing::Trim() {
 absl::StatusOr<PastFrame> FrameRing::Find(FrameId id) const {
   const std::lock_guard lock(mutex_);
   if (frames_.empty()) return absl::NotFoundError("no frame has been captured yet; wait for video");
+  const auto held = std::find_if(held_.begin(), held_.end(),
+                                 [id](const PastFrame& past) { return past.frame->id == id; });
+  if (held != held_.end()) return *held;
   const FrameId first = frames_.front().frame->id;
   const FrameId last = frames_.back().frame->id;
   if (id < first) {
@@ -75,6 +79,13 @@ absl::StatusOr<PastFrame> FrameRing::Newest() const {
   const std::lock_guard lock(mutex_);
   if (frames_.empty()) return absl::NotFoundError("no frame has been captured yet; wait for video");
   return frames_.back();
+}
+
+void FrameRing::Hold(const PastFrame& past) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(held_, [&](const PastFrame& kept) { return kept.frame->id == past.frame->id; });
+  held_.push_back(past);
+  if (held_.size() > options_.max_held) held_.pop_front();
 }
 
 }  // namespace saccade

@@ -23,7 +23,8 @@ struct PastFrame {
 using FrameLookup = std::function<absl::StatusOr<PastFrame>(FrameId)>;
 
 /// The last 10 s of frames by id: what a click on delayed video is resolved against, and where
-/// GetFrame takes stills from. Any thread; nothing is held longer than one look-up.
+/// GetFrame takes stills from. A still that somebody has fetched stays, to be clicked for as long
+/// as he looks at it: the last 16 of them, colour and all. Any thread.
 class FrameRing {
  public:
   struct Options {
@@ -31,6 +32,7 @@ class FrameRing {
     /// Above this, the oldest frames first lose their colour, then go. 640x480 at 30 Hz with colour
     /// fills it in about 8 s.
     std::size_t max_bytes = std::size_t{300} << 20;
+    std::size_t max_held = 16;
   };
 
   FrameRing() = default;
@@ -47,12 +49,16 @@ class FrameRing {
   /// The newest frame, or NotFound before the first.
   absl::StatusOr<PastFrame> Newest() const;
 
+  /// Keeps this frame when its time is over; the one held longest ago goes for it.
+  void Hold(const PastFrame& past);
+
  private:
   void Trim();
 
   Options options_;
   mutable std::mutex mutex_;
   std::deque<PastFrame> frames_;  // by rising id
+  std::deque<PastFrame> held_;    // newest last
   std::size_t bytes_ = 0;
   std::size_t colored_from_ = 0;  // frames before this index have lost their colour
 };

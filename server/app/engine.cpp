@@ -264,6 +264,7 @@ void Engine::RequestKeyFrame(VideoView view) {
 void Engine::GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) {
   absl::StatusOr<PastFrame> past = frame_id ? ring_.Find(*frame_id) : ring_.Newest();
   if (!past.ok()) return done(past.status());
+  ring_.Hold(*past);
   const absl::Status queued = stills_.Post({*std::move(past), view, done});
   if (!queued.ok()) done(queued);
 }

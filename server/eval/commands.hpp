@@ -47,6 +47,9 @@ absl::Status ScoreCommand(const ScoreArguments& arguments);
 absl::Status SimCommand(const SimArguments& arguments);
 /// Writes frames of a simulated source as the lens saw them, without noise: DIR/000123.png.
 absl::Status RenderCommand(const RenderArguments& arguments);
+/// Writes a simulated source as a recording in TUM layout, noise and all: rgb/, rgb.txt,
+/// camera.yaml and groundtruth.txt. It names no target, so it starts as a recording of a room does.
+absl::Status RecordCommand(const RenderArguments& arguments);
 
 /// Scenarios that SimCommand knows, for people: "points, desk, ...".
 std::string ScenarioNames();

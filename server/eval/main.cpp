@@ -75,6 +75,14 @@ void AddRender(CLI::App& app, RenderArguments& arguments) {
   render->add_option("--out", arguments.out, "Folder for 000000.png ...")->required();
 }
 
+void AddRecord(CLI::App& app, RenderArguments& arguments) {
+  CLI::App* record =
+      app.add_subcommand("record", "Write the simulator as a recording with ground truth");
+  record->add_option("--source", arguments.source, "sim:desk[?key=value&...]")->required();
+  record->add_option("--frames", arguments.frames, "Half-open range 0:B of frames");
+  record->add_option("--out", arguments.out, "Folder in TUM layout to write")->required();
+}
+
 int Main(int argc, char** argv) {
   cv::setNumThreads(1);  // results must not depend on the machine's cores
   CLI::App app("Saccade's evaluation: runs on recordings, scores, simulation", "saccade-eval");
@@ -86,11 +94,12 @@ int Main(int argc, char** argv) {
   RunArguments run;
   ScoreArguments score;
   SimArguments sim;
-  RenderArguments render;
+  RenderArguments render, record;
   AddRun(app, run);
   AddScore(app, score);
   AddSim(app, sim);
   AddRender(app, render);
+  AddRecord(app, record);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -101,6 +110,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("score")) status = ScoreCommand(score);
   if (app.got_subcommand("sim")) status = SimCommand(sim);
   if (app.got_subcommand("render")) status = RenderCommand(render);
+  if (app.got_subcommand("record")) status = RecordCommand(record);
   return status.ok() ? 0 : Fail(status);
 }
 

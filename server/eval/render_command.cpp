@@ -1,5 +1,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
 #include <absl/strings/strip.h>
 
 #include <iostream>
@@ -7,11 +8,19 @@
 
 #include "server/eval/commands.hpp"
 #include "server/eval/frame_range.hpp"
+#include "server/eval/output_file.hpp"
+#include "server/eval/trajectory.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {
+namespace {
 
-absl::Status RenderCommand(const RenderArguments& arguments) {
+struct SimFrames {
+  std::unique_ptr<SimSource> source;
+  std::uint64_t first = 0, end = 0;
+};
+
+absl::StatusOr<SimFrames> OpenFrames(const RenderArguments& arguments) {
   absl::string_view rest = arguments.source;
   if (!absl::ConsumePrefix(&rest, "sim:")) {
     return absl::InvalidArgumentError(
@@ -27,19 +36,68 @@ absl::Status RenderCommand(const RenderArguments& arguments) {
     return absl::InvalidArgumentError(
         "--frames has no end, and neither has the source; give A:B or duration=S");
   }
+  return SimFrames{*std::move(source), range->first, *end};
+}
+
+absl::Status WritePicture(const std::filesystem::path& file, const cv::Mat& picture) {
+  if (cv::imwrite(file.string(), picture)) return absl::OkStatus();
+  return absl::NotFoundError(
+      absl::StrCat("--out ", file.string(), ": cannot be written; is the folder writable?"));
+}
+
+std::string CameraYaml(const CameraIntrinsics& camera) {
+  std::string text =
+      camera.model == LensModel::kPinhole ? "model: pinhole\n" : "model: brown_conrady\n";
+  absl::StrAppendFormat(&text, "width: %d\nheight: %d\nfx: %.9g\nfy: %.9g\ncx: %.9g\ncy: %.9g\n",
+                        camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy);
+  return text + absl::StrFormat("distortion: [%s]\nfps: %.9g\n",
+                                absl::StrJoin(camera.distortion, ", "), camera.fps);
+}
+
+}  // namespace
+
+absl::Status RenderCommand(const RenderArguments& arguments) {
+  absl::StatusOr<SimFrames> frames = OpenFrames(arguments);
+  if (!frames.ok()) return frames.status();
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);
-  for (std::uint64_t frame = range->first; frame < *end; ++frame) {
-    const absl::StatusOr<cv::Mat> picture = (*source)->RenderClean(frame);
+  for (std::uint64_t frame = frames->first; frame < frames->end; ++frame) {
+    const absl::StatusOr<cv::Mat> picture = frames->source->RenderClean(frame);
     if (!picture.ok()) return picture.status();
     const std::filesystem::path file = arguments.out / absl::StrFormat("%06d.png", frame);
-    if (!cv::imwrite(file.string(), *picture)) {
-      return absl::NotFoundError(
-          absl::StrCat("--out ", file.string(), ": cannot be written; is the folder writable?"));
-    }
+    if (absl::Status status = WritePicture(file, *picture); !status.ok()) return status;
     std::cout << file.string() << "\n";
   }
   return absl::OkStatus();
+}
+
+absl::Status RecordCommand(const RenderArguments& arguments) {
+  absl::StatusOr<SimFrames> frames = OpenFrames(arguments);
+  if (!frames.ok()) return frames.status();
+  const std::filesystem::path& out = arguments.out;
+  if (absl::Status status = CreateFolder(out / "rgb"); !status.ok()) return status;
+  absl::StatusOr<OutputFile> list = OutputFile::Create(out / "rgb.txt");
+  if (!list.ok()) return list.status();
+  absl::StatusOr<OutputFile> truth = OutputFile::Create(out / "groundtruth.txt");
+  if (!truth.ok()) return truth.status();
+  const std::string camera = CameraYaml(frames->source->info().camera->intrinsics());
+  if (absl::Status status = WriteFileAtomically(out / "camera.yaml", camera); !status.ok()) {
+    return status;
+  }
+  while (true) {
+    absl::StatusOr<std::optional<Frame>> frame = frames->source->Next();
+    if (!frame.ok()) return frame.status();
+    if (!*frame || (*frame)->id >= frames->end) break;
+    if ((*frame)->id < frames->first) continue;
+    const std::string stamp = absl::StrFormat("%.6f", Seconds((*frame)->capture_time_ns));
+    const std::string name = absl::StrCat("rgb/", stamp, ".png");
+    const cv::Mat& picture = (*frame)->color.empty() ? (*frame)->grey : (*frame)->color;
+    if (absl::Status status = WritePicture(out / name, picture); !status.ok()) return status;
+    list->Write(absl::StrCat(stamp, " ", name, "\n"));
+    truth->Write(TumLine(stamp, frames->source->WorldFromCamera((*frame)->id)));
+  }
+  if (absl::Status status = list->Close(); !status.ok()) return status;
+  return truth->Close();
 }
 
 }  // namespace saccade

@@ -24,7 +24,7 @@ struct PixelScenario {
 /// Scenarios through pixels; `points`, `forms` and `soak` are at feature level.
 constexpr PixelScenario kPixelScenarios[] = {
     {"desk", SimMotion::kDesk}, {"sway", SimMotion::kSway},   {"walk", SimMotion::kWalk},
-    {"turn", SimMotion::kTurn}, {"still", SimMotion::kStill},
+    {"turn", SimMotion::kTurn}, {"twist", SimMotion::kTwist}, {"still", SimMotion::kStill},
 };
 
 double Share(std::uint64_t part, std::uint64_t whole) {

@@ -54,8 +54,11 @@ absl::Status SetMotion(const std::string& value, SimMotion& out) {
     out = SimMotion::kRoll;
   } else if (value == "stroll") {
     out = SimMotion::kStroll;
+  } else if (value == "twist") {
+    out = SimMotion::kTwist;
   } else {
-    return Bad("motion", value, "desk, sway, walk, turn, still, stand, rock, roll or stroll");
+    return Bad("motion", value,
+               "desk, sway, walk, turn, still, stand, rock, roll, stroll or twist");
   }
   return absl::OkStatus();
 }

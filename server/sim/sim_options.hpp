@@ -11,7 +11,7 @@
 namespace saccade {
 
 /// What the simulated wearer does (README.md describes each).
-enum class SimMotion { kDesk, kSway, kWalk, kTurn, kStill, kStand, kRock, kRoll, kStroll };
+enum class SimMotion { kDesk, kSway, kWalk, kTurn, kStill, kStand, kRock, kRoll, kStroll, kTwist };
 
 /// `sim:desk?key=value&...`. Every key is optional.
 struct SimOptions {

@@ -189,6 +189,24 @@ Wearer::Stance Wearer::Stroll(double time_s) const {
   return stance;
 }
 
+// In the hand: about one axis after the other, 30 deg to and fro at up to 65 deg/s, hardly any way.
+Wearer::Stance Wearer::Twist(double time_s) const {
+  Stance stance;
+  constexpr double kTurn_s = 6.0;  // about one axis
+  const double moving_s = std::max(0.0, time_s - kRestS);
+  const auto turn = static_cast<std::uint64_t>(moving_s / kTurn_s);
+  const double in_turn_s = moving_s - kTurn_s * static_cast<double>(turn);
+  const double fade = MinimumJerk(in_turn_s / 1.0) * MinimumJerk((kTurn_s - in_turn_s) / 1.0);
+  const double hz = 0.31 + 0.03 * Random(80, turn);
+  const double angle = 30.0 * kDegree * fade * std::sin(kTwoPi * hz * in_turn_s);
+  const std::uint64_t first = Random(81, 0) > 0 ? 0 : 1;
+  double* const axes[] = {&stance.yaw, &stance.pitch, &stance.roll};
+  *axes[(first + turn) % 3] += angle;
+  stance.position += 0.04 * Eigen::Vector3d(Signal(time_s, 1.6, 82), Signal(time_s, 1.7, 83),
+                                            Signal(time_s, 1.5, 84));
+  return stance;
+}
+
 Wearer::Stance Wearer::StanceAt(double time_s) const {
   Stance stance;
   double sway = 0.15 + 0.85 * MinimumJerk((time_s - kRestS) / 1.5);
@@ -212,6 +230,9 @@ Wearer::Stance Wearer::StanceAt(double time_s) const {
     case SimMotion::kStroll:
       stance = Stroll(time_s);
       sway *= 0.4;
+      break;
+    case SimMotion::kTwist:
+      stance = Twist(time_s);
       break;
     case SimMotion::kStand:
       break;

@@ -39,6 +39,7 @@ class Wearer {
   Stance Rock(double time_s) const;
   Stance Roll(double time_s) const;
   Stance Stroll(double time_s) const;
+  Stance Twist(double time_s) const;
   /// A smooth random signal, mostly within +-1, at rest for the first 1.2 seconds.
   double Signal(double time_s, double knot_s, std::uint64_t channel) const;
   double Random(std::uint64_t channel, std::uint64_t index) const;  // uniform in -1 .. 1

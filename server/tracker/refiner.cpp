@@ -1,5 +1,8 @@
 #include "server/tracker/refiner.hpp"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <chrono>
 
 #include "server/pipeline/stop_watch.hpp"
@@ -9,6 +12,9 @@ namespace {
 
 constexpr double kKeyframeShare = 0.01;  // of the distance to what is in view
 constexpr double kKeyframeAngle_rad = 0.03;
+// An adjustment that moves the camera by more is told to the experts as a jump.
+constexpr double kJumpShare = 0.02;
+constexpr double kJumpAngle_rad = 0.02;
 
 std::optional<GraphEstimate> EstimateOf(const FilterState& filter, FeatureId id) {
   if (!filter.Has(id)) return std::nullopt;
@@ -86,6 +92,8 @@ void Refiner::Start(std::int64_t frame, FilterState& filter) {
   started_ = frame;
   filter.Mark();
   running_ = std::async(std::launch::async, [this, job = *std::move(job)]() mutable {
+    // Late is no loss, but pictures and heartbeats are: what is live comes first.
+    if (options_.adjust_live) setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
     std::optional<KeyframeGraph::Job> done;
     if (AdjustBundle(job.problem, stop_)) done = std::move(job);
     return done;
@@ -96,7 +104,7 @@ void Refiner::Wait() const {
   if (running_.valid()) running_.wait();
 }
 
-bool Refiner::Finish(std::int64_t frame, FilterState& filter) {
+bool Refiner::Finish(std::int64_t frame, double inverse_range, FilterState& filter) {
   waited_ms_ = 0.0;
   if (!running_.valid() || frame < started_ + options_.adjust_delay) return false;
   if (options_.adjust_live &&
@@ -110,8 +118,11 @@ bool Refiner::Finish(std::int64_t frame, FilterState& filter) {
     filter.DropMark();
     return false;
   }
+  const Rigid3 before = filter.camera().world_from_camera;
   Put(*job, filter);
-  return true;
+  const Rigid3& after = filter.camera().world_from_camera;
+  return (after.translation - before.translation).norm() * inverse_range > kJumpShare ||
+         RotationAngle(before, after) > kJumpAngle_rad;
 }
 
 void Refiner::Put(const KeyframeGraph::Job& job, FilterState& filter) {

@@ -234,7 +234,7 @@ void Tracker::Impl::Manage(const Frame& frame) {
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;
-  if (refiner_.Finish(frames_, filter_)) ++revision_;
+  if (refiner_.Finish(frames_, depth_.inverse_range, filter_)) ++revision_;
   times_.waited_ms = refiner_.waited_ms();
   if (!telling || covered) return;
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;

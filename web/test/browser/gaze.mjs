@@ -4,6 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { Expert } from './expert.mjs';
 import { inCamera, inWorld, length, minus, project, times, unproject } from './optics.mjs';
+import { median } from './pictures.mjs';
 import { startServer, Truth } from './server.mjs';
 import { createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
@@ -14,6 +15,8 @@ import { Role, SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 const LIMIT_DEG = 2;
 const MAPPED_M = 0.05; // in the map one can only click what it shows
 const BORDER_PX = 60; // the click is well inside
+const HEARTBEAT_S = 5; // a second page that loads can keep two cores busy for longer than 2 s
+const HOLD_S = 2; // over which holding is judged: the wearer sways, a single frame says little
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -22,7 +25,7 @@ export async function runGaze({ server: binary, chromium, seed, shots, folder })
   // Two pages, simulator and tracker share two cores with a software GPU: the server waits longer for
   // a heartbeat than the 500 ms it does by default.
   const config = join(folder, 'gaze.toml');
-  writeFileSync(config, '[gaze]\nheartbeat_s = 2.0\n');
+  writeFileSync(config, `[gaze]\nheartbeat_s = ${HEARTBEAT_S}.0\n`);
   const server = await startServer(binary, [
     ...['--source', `sim:desk?seed=${seed}&motion=stand`, '--mount', 'sim', '--config', config],
     ...['--sim-truth', truthFile, '--data-dir', join(folder, 'gaze-data')],
@@ -103,7 +106,7 @@ async function turnAndHold(context) {
     const seconds = (performance.now() - begin) / 1000;
     await sleep(500);
     const { error, doing } = (await panelWhen(ann.page, ({ arrived }) => arrived, 3000)).panel;
-    const truth = trueError(context, (await ann.look()).id, object);
+    const truth = await medianError(context, object);
     await shot(context, ann.page, `gaze-${pane}-hold`);
     check(
       `a click in the ${pane} turns the camera, which then holds within ${LIMIT_DEG} deg`,
@@ -112,6 +115,15 @@ async function turnAndHold(context) {
         `true error ${truth.toFixed(2)} deg`,
     );
   }
+}
+
+/** The middle one of the true errors of the frames that the page shows in these seconds [deg]. */
+async function medianError(context, object) {
+  const ids = new Set();
+  for (const end = Date.now() + 1000 * HOLD_S; Date.now() < end; await sleep(40)) {
+    ids.add((await context.ann.look()).id);
+  }
+  return median([...ids].map((id) => trueError(context, id, object)));
 }
 
 /** The true angle between the optic axis of a frame and an object. */
@@ -182,10 +194,10 @@ async function wearerTakesOver({ ann, session, gaze, check }) {
   const { sessionId } = await session.join({ displayName: 'Wim', role: Role.WEARER });
   await gaze.override({ sessionId, enabled: true });
   const queue = 'Wim pilots · you are 1st in the queue';
-  const waits = await panelWhen(ann.page, ({ steer }) => steer === queue, 2000);
+  const waits = await panelWhen(ann.page, ({ steer }) => steer === queue, 5000);
   await gaze.override({ sessionId, enabled: false });
-  const back = await panelWhen(ann.page, ({ steer }) => steer === 'you pilot', 2000);
-  await sleep(2300); // longer than the server waits for a heartbeat
+  const back = await panelWhen(ann.page, ({ steer }) => steer === 'you pilot', 5000);
+  await sleep(1000 * HEARTBEAT_S + 300); // longer than the server waits for a heartbeat
   const { steer } = await panelOf(ann.page);
   check(
     'the wearer takes over; given back, the pilot has it again and keeps it',
@@ -201,19 +213,19 @@ async function handsChange(context, url) {
   const bob = await ann.context.newPage();
   await bob.setViewportSize({ width: 700, height: 500 });
   await bob.goto(url);
-  const seen = await panelWhen(bob, ({ steer }) => steer === 'Ann pilots', 10_000);
+  const seen = await panelWhen(bob, ({ steer }) => steer === 'Ann pilots', 30_000);
   check('a second page sees who pilots', seen.ok, `"${seen.panel.steer}"`);
   await bob.keyboard.press('q');
-  const waits = await panelWhen(bob, ({ steer }) => steer.includes('1st in the queue'), 4000);
-  const told = await panelWhen(ann.page, ({ steer }) => steer === 'you pilot · Bob waits', 4000);
+  const waits = await panelWhen(bob, ({ steer }) => steer.includes('1st in the queue'), 10_000);
+  const told = await panelWhen(ann.page, ({ steer }) => steer === 'you pilot · Bob waits', 10_000);
   check('he waits, and the pilot sees it', waits.ok && told.ok, `"${told.panel.steer}"`);
 
   await ann.press('x');
-  const stopped = await panelWhen(ann.page, ({ mode }) => mode === 'stopped', 2000);
+  const stopped = await panelWhen(ann.page, ({ mode }) => mode === 'stopped', 5000);
   check('stop stops', stopped.ok, `"${stopped.panel.doing}"`);
   await ann.press('q');
-  const his = await panelWhen(bob, ({ steer }) => steer === 'you pilot', 4000);
-  const notice = await panelWhen(ann.page, (panel) => panel.notice.includes('Bob pilots'), 2000);
+  const his = await panelWhen(bob, ({ steer }) => steer === 'you pilot', 10_000);
+  const notice = await panelWhen(ann.page, (panel) => panel.notice.includes('Bob pilots'), 5000);
   await shot(context, ann.page, 'gaze-handover');
   check(
     'released, it is his turn, and everybody is told',
@@ -221,6 +233,6 @@ async function handsChange(context, url) {
     notice.panel.notice,
   );
   await bob.close();
-  const parked = await panelWhen(ann.page, ({ mode }) => mode === 'parked', 4000);
+  const parked = await panelWhen(ann.page, ({ mode }) => mode === 'parked', 10_000);
   check('with his page gone the head parks', parked.ok, `"${parked.panel.doing}"`);
 }

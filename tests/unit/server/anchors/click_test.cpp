@@ -200,11 +200,9 @@ TEST(Click, RayFromTheMapViewMeetsTheSurface) {
   EXPECT_NEAR(edit->annotation.anchor.point_in_world.z(), 2.5, 0.05);  // the back wall
 }
 
-TEST(FrameRing, KeepsTenSecondsAndDropsColourFirst) {
-  FrameRing::Options options;
-  options.max_bytes = 100 * 100 * 4 * 3;
-  FrameRing ring(options);
-  for (FrameId id = 0; id < 8; ++id) {
+/// A frame a second, 100x100 in colour.
+void PushFrames(FrameId first, FrameId end, FrameRing& ring) {
+  for (FrameId id = first; id < end; ++id) {
     auto frame = std::make_shared<Frame>();
     frame->id = id;
     frame->capture_time_ns = static_cast<Timestamp>(id) * 1'000'000'000;
@@ -212,6 +210,30 @@ TEST(FrameRing, KeepsTenSecondsAndDropsColourFirst) {
     frame->color = cv::Mat(100, 100, CV_8UC3);
     ring.Push({frame, std::make_shared<MapSnapshot>()});
   }
+}
+
+TEST(FrameRing, HoldsWhatWasFetchedUntilTheSourceStartsAgain) {
+  FrameRing::Options options;
+  options.max_held = 2;
+  FrameRing ring(options);
+  PushFrames(0, 6, ring);
+  for (const FrameId id : {1u, 2u, 3u, 2u}) ring.Hold(*ring.Find(id));
+  PushFrames(6, 40, ring);
+  EXPECT_FALSE(ring.Find(1).ok());
+  EXPECT_FALSE(ring.Find(4).ok());
+  ASSERT_TRUE(ring.Find(2).ok());
+  EXPECT_EQ(ring.Find(2)->frame->id, 2u);
+  EXPECT_FALSE(ring.Find(2)->frame->color.empty());
+  ASSERT_TRUE(ring.Find(3).ok());
+  PushFrames(0, 1, ring);
+  EXPECT_FALSE(ring.Find(2).ok());
+}
+
+TEST(FrameRing, KeepsTenSecondsAndDropsColourFirst) {
+  FrameRing::Options options;
+  options.max_bytes = 100 * 100 * 4 * 3;
+  FrameRing ring(options);
+  PushFrames(0, 8, ring);
   ASSERT_TRUE(ring.Find(7).ok());
   EXPECT_FALSE(ring.Find(7)->frame->color.empty());
   ASSERT_TRUE(ring.Find(3).ok());

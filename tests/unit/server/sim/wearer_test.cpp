@@ -12,8 +12,8 @@ namespace saccade {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr SimMotion kMotions[] = {SimMotion::kDesk, SimMotion::kSway, SimMotion::kWalk,
-                                  SimMotion::kTurn, SimMotion::kStill};
+constexpr SimMotion kMotions[] = {SimMotion::kDesk, SimMotion::kSway,  SimMotion::kWalk,
+                                  SimMotion::kTurn, SimMotion::kTwist, SimMotion::kStill};
 
 double AngularSpeed(const Wearer& wearer, double time_s) {
   constexpr double kStep = 1e-3;
@@ -80,6 +80,23 @@ TEST(Wearer, TurnsReachSixtyDegreesPerSecond) {
     EXPECT_LT(fastest, 130 * kDegree);
     EXPECT_GT(widest, 55 * kDegree);
   }
+}
+
+TEST(Wearer, TwistTurnsAboutAllAxesInPlace) {
+  const Wearer wearer(SimMotion::kTwist, 2);
+  const Rigid3 start = wearer.WorldFromCamera(0, {});
+  Eigen::Array3d widest = Eigen::Array3d::Zero();
+  double fastest = 0;
+  for (double t = 0; t < 21; t += 0.02) {
+    const Rigid3 now = wearer.WorldFromCamera(t, {});
+    const Eigen::AngleAxisd turn((start.Inverse() * now).rotation);
+    widest = widest.max((turn.angle() * turn.axis()).array().abs());
+    fastest = std::max(fastest, AngularSpeed(wearer, t));
+    EXPECT_LT((now.translation - start.translation).norm(), 0.25);
+  }
+  EXPECT_GT(widest.minCoeff(), 25 * kDegree);
+  EXPECT_GT(fastest, 50 * kDegree);
+  EXPECT_LT(fastest, 85 * kDegree);
 }
 
 TEST(Wearer, SwayLeansFarEnoughForParallax) {

@@ -64,12 +64,19 @@ class Recovery : public testing::Test {
     if (!std::filesystem::exists(folder)) GTEST_SKIP() << "data set tum_fr1_xyz is not here";
     player_ = std::make_unique<Player>(folder, 330);
     ASSERT_TRUE(player_->ready());
-    for (std::size_t k = 0; k < 300; ++k) poses_.push_back(player_->Show(k)->world_from_camera);
+    for (std::size_t k = 0; k < 300; ++k) {
+      const Snapshot shown = player_->Show(k);
+      poses_.push_back(shown->world_from_camera);
+      revisions_.push_back(shown->map_revision);
+    }
   }
 
   std::unique_ptr<Player> player_;
   std::vector<Rigid3> poses_;
+  std::vector<std::uint64_t> revisions_;
 };
+
+TEST_F(Recovery, WhatIsRefinedAllTheTimeIsNoJump) { EXPECT_EQ(revisions_[299], revisions_[60]); }
 
 TEST_F(Recovery, AfterTheViewJumpsBackToAMappedPlace) {
   Snapshot last;
