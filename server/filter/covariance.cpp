@@ -72,6 +72,17 @@ void Covariance::TransformRankOne(const Eigen::VectorXd& d, const Eigen::VectorX
   p.rankUpdate(d, u, 1.0);
 }
 
+void Covariance::Condition(const Eigen::MatrixXd& a, int offset) {
+  const auto size = a.cols();
+  Eigen::MatrixXd left(n_, 2 * size), right(n_, 2 * size);
+  CopyColumns(offset, static_cast<int>(size), left.leftCols(size));
+  const Eigen::MatrixXd own = left.middleRows(offset, size).leftCols(size);
+  left.leftCols(size) -= 0.5 * a * own;
+  left.rightCols(size) = a;
+  right << a, left.leftCols(size);
+  p_.topLeftCorner(n_, n_).triangularView<Eigen::Lower>() -= left * right.transpose();
+}
+
 void Covariance::ReplaceBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& diagonal_block) {
   const int size = static_cast<int>(diagonal_block.rows());
   p_.block(offset, 0, size, offset).setZero();

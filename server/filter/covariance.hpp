@@ -30,6 +30,8 @@ class Covariance {
   void TransformBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& block);
   /// P <- T P T^T with T = I + d w^T (both n).
   void TransformRankOne(const Eigen::VectorXd& d, const Eigen::VectorXd& w);
+  /// P <- (I - A E) P (I - A E)^T where E picks the rows [offset, offset + A.cols()).
+  void Condition(const Eigen::MatrixXd& a, int offset);
   /// Zeroes rows and columns [offset, offset + size) and puts `diagonal_block` there.
   void ReplaceBlock(int offset, const Eigen::Ref<const Eigen::MatrixXd>& diagonal_block);
   /// The block that these rows (any order) share.

@@ -182,6 +182,25 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& bi
   return absl::OkStatus();
 }
 
+bool FilterState::CountErrorsFrom(AnchorPoseId anchor) {
+  const auto from = std::find_if(anchors_.begin(), anchors_.end(),
+                                 [&](const Anchor& a) { return a.id == anchor; });
+  if (from == anchors_.end() || Fej()) return false;
+  // By its error (dr, th) the world has turned by R th about the clone and moved by dr.
+  const Eigen::Matrix3d turn = from->pose.rotation.toRotationMatrix();
+  Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(dim(), kPoseDim);
+  const auto move = [&](int offset, const Rigid3& pose) {
+    moved.block<3, 3>(offset, 0).setIdentity();
+    moved.block<3, 3>(offset, 3) = -Skew(pose.translation - from->pose.translation) * turn;
+    moved.block<3, 3>(offset + 3, 3) = pose.rotation.toRotationMatrix().transpose() * turn;
+  };
+  move(0, camera_.world_from_camera);
+  moved.block<3, 3>(6, 3) = -Skew(camera_.velocity_m_s) * turn;
+  for (const Anchor& each : anchors_) move(each.offset, each.pose);
+  covariance_.Condition(moved, from->offset);
+  return true;
+}
+
 void FilterState::Remove(std::span<const FeatureId> ids) {
   std::vector<std::pair<int, int>> gone;
   for (const FeatureId id : ids) {

@@ -175,6 +175,12 @@ class FilterState {
   /// without one.
   void Refine(const Refinement& refinement);
 
+  /// From here on errors are counted from this clone: its pose defines the world, and has no error
+  /// (README: gauge; Baarda's S-transformation). Estimates stay, and so does every uncertainty of
+  /// one thing seen from another. False, and nothing is done: the clone is unknown, or Jacobians
+  /// are at first estimates, which learn nothing of where the world is. O(n^2).
+  bool CountErrorsFrom(AnchorPoseId anchor);
+
   /// Removes features whose inverse range is negative by two sigma; returns them.
   std::vector<FeatureId> RemoveBehind();
 

@@ -37,8 +37,8 @@ class Refiner {
             double inverse_range);
   /// Starts an adjustment if there is something new and none is running.
   void Start(std::int64_t frame, FilterState& filter);
-  /// Puts a finished one into the filter. True: the camera jumped by it, seen against the distance to
-  /// what is in view.
+  /// Puts a finished one into the filter. True: the camera jumped by it, seen against the distance
+  /// to what is in view.
   bool Finish(std::int64_t frame, double inverse_range, FilterState& filter);
   /// Returns when no adjustment is being computed any more.
   void Wait() const;

@@ -60,6 +60,7 @@ void Tracker::Impl::Reset() {
   before_relocalisation_.reset();
   started_ = metric_ = has_frame_ = false;
   frames_ = frames_lost_ = 0;
+  home_ = 1;
   ++generation_;
   ++revision_;
 }
@@ -212,6 +213,23 @@ void Tracker::Impl::KeepTargetPoints(const Frame& frame) {
   if (anchor) filter_.Remove({});  // a clone that nothing was planted in goes again
 }
 
+void Tracker::Impl::MoveHome() {
+  if (options_.home_share <= 0.0) return;
+  std::vector<AnchorPoseId> seen_from;
+  for (const LandmarkMatch& match : matches_.in_view) {
+    if (std::holds_alternative<Eigen::Vector3d>(match.point)) return;  // the target is the world
+    if (match.accepted() && filter_.Has(match.id)) seen_from.push_back(filter_.AnchorOf(match.id));
+  }
+  if (seen_from.empty()) return;
+  const auto from_home = std::count_if(seen_from.begin(), seen_from.end(),
+                                       [&](AnchorPoseId id) { return id <= home_; });
+  if (from_home >= options_.home_share * static_cast<double>(seen_from.size())) return;
+  const auto middle = seen_from.begin() + std::ssize(seen_from) / 2;
+  std::nth_element(seen_from.begin(), middle, seen_from.end());
+  if (*middle <= home_) return;  // back at places older than home
+  if (filter_.CountErrorsFrom(*middle)) home_ = *middle;
+}
+
 void Tracker::Impl::Manage(const Frame& frame) {
   // A frame in which hardly anything was found says nothing about single features.
   const bool telling = matches_.accepted >= 0.3 * matches_.attempted;
@@ -234,6 +252,7 @@ void Tracker::Impl::Manage(const Frame& frame) {
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;
+  MoveHome();
   if (refiner_.Finish(frames_, depth_.inverse_range, filter_)) ++revision_;
   times_.waited_ms = refiner_.waited_ms();
   if (!telling || covered) return;

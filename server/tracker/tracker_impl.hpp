@@ -36,6 +36,9 @@ class Tracker::Impl {
   void PredictAndSearch(const CameraModel& camera, double dt);
   void Correct(const CameraModel& camera);
   void Manage(const Frame& frame);
+  /// Errors are counted from where the camera is, not from where it once began (server/filter,
+  /// gauge).
+  void MoveHome();
   void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
   bool Settled() const;
@@ -63,6 +66,7 @@ class Tracker::Impl {
   std::int64_t frames_ = 0;  // since the start of this map
   std::int64_t frames_lost_ = 0;
   std::uint64_t revision_ = 0;
+  AnchorPoseId home_ = 1;  // clone that errors are counted from; at first where the map began
   std::uint64_t generation_ = 0;
   FrameMatches matches_;
   StageTimes times_;

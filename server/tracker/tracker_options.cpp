@@ -39,6 +39,7 @@ const Key kKeys[] = {
     {"pixel_sigma_px", &O::pixel_sigma_px, 0.01, 20},
     {"pixel_sigma_growth", &O::pixel_sigma_growth, 0, 10},
     {"readout_sigma_s", &O::readout_sigma_s, 0, 0.1},
+    {"home_share", &O::home_share, 0, 1},
     {"parallax_sigmas", &O::parallax_sigmas, 0, 100},
     {"carry_scale_after", &O::carry_scale_after, 0, 1e9},
     {"robust", &O::robust, 0, 1},

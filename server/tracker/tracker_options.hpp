@@ -35,8 +35,11 @@ struct TrackerOptions {
   double readout_sigma_s = 0.015;
   double parallax_sigmas = 3.0;  // of a clone's matches, before they correct depth (T13)
   int carry_scale_after = 60;    // updates, before a change of scale is kept unobserved
-  bool robust = true;            // matches are weighted by the robust pose; false: gates only
-  double robust_cutoff = 4.5;    // Mahalanobis distance from which a match is ignored
+  /// Of the matches, that the clone which errors are counted from (or older ones) must have given
+  /// birth to; below, a younger clone takes its place. 0: errors are counted from the start.
+  double home_share = 0.2;
+  bool robust = true;          // matches are weighted by the robust pose; false: gates only
+  double robust_cutoff = 4.5;  // Mahalanobis distance from which a match is ignored
 
   // Search (slam-spec 5.1).
   int first_stage = 20;          // features searched widely, for the robust pose

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <map>
 
 #include "server/filter/robust_pose.hpp"
 #include "tests/unit/server/filter/random_world.hpp"
@@ -144,6 +145,34 @@ TEST(FilterState, CloneCarriesTheWholeCovarianceOfThePose) {
   EXPECT_EQ(Eigen::MatrixXd(p.block(offset, 0, 6, offset)),
             Eigen::MatrixXd(p.block(0, 0, 6, offset)));
   EXPECT_EQ(Eigen::MatrixXd(p.block(offset, offset, 6, 6)), Eigen::MatrixXd(p.block(0, 0, 6, 6)));
+}
+
+TEST(FilterState, CountingErrorsFromACloneKeepsWhatIsSeenFromElsewhere) {
+  Simulation run(5, 20, FilterOptions());
+  // Where the world is, is known badly; what things are to one another, well.
+  run.filter_.Reset(CameraMotion(), SmallCovariance(0.5, 0.2, 0.3, 0.5));
+  run.BirthAll(0.5, 0.25, 0.3);
+  for (int k = 1; k < 80; ++k) run.Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.3);
+  const AnchorPoseId clone = run.filter_.AnchorOf(1);
+  constexpr int kClone = FilterState::kCameraDim;  // where the first clone is in the state
+  ASSERT_GT(run.filter_.FullCovariance().block(kClone, kClone, 6, 6).trace(), 0.5);
+  std::map<FeatureId, Eigen::Matrix2d> before;
+  for (const FeatureId id : run.filter_.FeatureIds()) {
+    if (const auto seen = run.filter_.Predicted(run.lens_, id)) before[id] = seen->covariance;
+  }
+  ASSERT_GT(before.size(), 10u);
+  const Rigid3 pose = run.filter_.camera().world_from_camera;
+  EXPECT_FALSE(run.filter_.CountErrorsFrom(clone + 1));
+  ASSERT_TRUE(run.filter_.CountErrorsFrom(clone));
+  for (const auto& [id, covariance] : before) {
+    const auto after = run.filter_.Predicted(run.lens_, id)->covariance;
+    EXPECT_LT((after - covariance).norm(), 1e-7 * covariance.norm() + 1e-9) << id;
+  }
+  const Eigen::MatrixXd p = run.filter_.FullCovariance();
+  EXPECT_LT(p.middleRows(kClone, 6).norm(), 1e-9);
+  EXPECT_LT(run.filter_.PoseCovariance().trace(), 0.05);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(p).eigenvalues().minCoeff(), -1e-10);
+  EXPECT_EQ((pose.translation - run.filter_.camera().world_from_camera.translation).norm(), 0.0);
 }
 
 TEST(FilterState, KalmanAndInformationFormAgreeT4) {
