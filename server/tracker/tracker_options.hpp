@@ -22,7 +22,7 @@ struct TrackerOptions {
   double angular_acceleration_sigma_rad_s2 = 6.0;
   // The same where encoders tell what the head does: only the wearer is left to be guessed.
   bool encoders = true;  // use them
-  double worn_acceleration_sigma_m_s2 = 4.0;
+  double worn_acceleration_sigma_m_s2 = 2.0;
   double worn_angular_acceleration_sigma_rad_s2 = 2.0;  // a walking trunk
 
   // Filter.
