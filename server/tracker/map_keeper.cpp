@@ -71,8 +71,10 @@ void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map
 }
 
 bool MapKeeper::Wants(const FrameMatches& matches, const FilterState&) const {
-  int usable = 0;  // what is sought in vain is of no use
-  for (const LandmarkMatch& match : matches.in_view) usable += match.accepted() ? 1 : 0;
+  int usable = 0;
+  for (const LandmarkMatch& match : matches.in_view) {
+    usable += match.searched || match.weight > 0 ? 1 : 0;
+  }
   const int missing = options_.features_in_view - usable;
   if (missing <= 0) return false;
   if (missing > options_.features_in_view / 2) return true;

@@ -37,7 +37,7 @@ struct TrackerOptions {
   int carry_scale_after = 60;    // updates, before a change of scale is kept unobserved
   /// Of the matches, that the clone which errors are counted from (or older ones) must have given
   /// birth to; below, a younger clone takes its place. 0: errors are counted from the start.
-  double home_share = 0.2;
+  double home_share = 0.5;
   bool robust = true;          // matches are weighted by the robust pose; false: gates only
   double robust_cutoff = 4.5;  // Mahalanobis distance from which a match is ignored
 
