@@ -29,7 +29,8 @@ void KeyframeGraph::Clear() {
 
 KeyframeId KeyframeGraph::Add(const Rigid3& world_from_camera, double distance_m,
                               std::span<const GraphSighting> sightings,
-                              std::span<const GraphBirth> births) {
+                              std::span<const GraphBirth> births,
+                              const std::function<bool(FeatureId)>& lives) {
   const KeyframeId id = next_++;
   Keyframe& keyframe = keyframes_[id];
   keyframe.world_from_camera = world_from_camera;
@@ -43,13 +44,18 @@ KeyframeId KeyframeGraph::Add(const Rigid3& world_from_camera, double distance_m
     points_[birth.id] = {id, birth, {birth.bearing, birth.inverse_range}, {}};
     keyframe.births.push_back(birth.id);
   }
-  Thin();
+  Thin(lives);
   return id;
 }
 
-void KeyframeGraph::Thin() {
+void KeyframeGraph::Thin(const std::function<bool(FeatureId)>& lives) {
+  const auto dead = [&](const auto& entry) {
+    return !lives || std::none_of(entry.second.births.begin(), entry.second.births.end(), lives);
+  };
   while (static_cast<int>(keyframes_.size()) > options_.max_keyframes) {
-    Erase(keyframes_.begin()->first);
+    const auto newest = std::prev(keyframes_.end());
+    const auto oldest = std::find_if(keyframes_.begin(), newest, dead);
+    Erase(oldest == newest ? keyframes_.begin()->first : oldest->first);
   }
   if (static_cast<int>(keyframes_.size()) <= options_.dense_keyframes + 1) return;
   const auto old = std::prev(keyframes_.end(), options_.dense_keyframes + 1);

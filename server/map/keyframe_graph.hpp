@@ -41,7 +41,7 @@ struct KeyframeGraphOptions {
   int dense_keyframes = 40;       // the newest are all kept; before them, only those that are apart
   double apart_share = 0.05;      // of the distance to what is in view
   double apart_rad = 0.12;        // 7 deg
-  int max_keyframes = 600;        // then the oldest go
+  int max_keyframes = 600;        // then the oldest go that no living feature was born in
   int adjusted_keyframes = 30;    // newest, and those that share most points with them
   int held_keyframes = 15;        // around them, fixed
   int max_points = 300;           // adjusted at once
@@ -58,9 +58,11 @@ class KeyframeGraph {
 
   void Clear();
   std::size_t size() const { return keyframes_.size(); }
-  /// `distance_m`: typical, to what is in view.
+  /// `distance_m`: typical, to what is in view. `lives`: whether a feature is still in the filter;
+  /// what the graph forgets of those would tear them from the rest at the next adjustment.
   KeyframeId Add(const Rigid3& world_from_camera, double distance_m,
-                 std::span<const GraphSighting> sightings, std::span<const GraphBirth> births);
+                 std::span<const GraphSighting> sightings, std::span<const GraphBirth> births,
+                 const std::function<bool(FeatureId)>& lives = {});
   /// The newest keyframe's pose; nothing if there is none.
   std::optional<Rigid3> Newest() const;
   std::optional<Rigid3> Pose(KeyframeId id) const;
@@ -95,7 +97,7 @@ class KeyframeGraph {
   };
   using Ranked = std::vector<std::pair<int, KeyframeId>>;
 
-  void Thin();
+  void Thin(const std::function<bool(FeatureId)>& lives);
   void Erase(KeyframeId id);
   /// Keyframes that see these points, most of them first.
   Ranked WhoSees(std::span<const FeatureId> points) const;

@@ -80,7 +80,8 @@ void Refiner::Keep(const CameraModel& camera, const FilterState& filter,
     }
     sightings.push_back(sighting);
   }
-  const KeyframeId id = graph_.Add(pose, distance, sightings, births);
+  const KeyframeId id = graph_.Add(pose, distance, sightings, births,
+                                   [&](FeatureId feature) { return filter.Has(feature); });
   if (clone) clones_[id] = *clone;
   if (!ids.empty()) newest_feature_ = std::max(newest_feature_, ids.back());
 }

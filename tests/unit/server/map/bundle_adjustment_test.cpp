@@ -213,6 +213,20 @@ TEST(KeyframeGraph, AJobOutlivesWhatItWasMadeOf) {
   EXPECT_EQ(graph.size(), 12u);
 }
 
+TEST(KeyframeGraph, KeepsWhatLivingFeaturesWereBornIn) {
+  for (const bool living : {true, false}) {
+    KeyframeGraphOptions options;
+    options.dense_keyframes = options.max_keyframes = 12;
+    KeyframeGraph graph(options);
+    Arc arc(12, 60, 0.5);
+    Fill(graph, arc);  // keyframe 0 gives birth to all
+    const auto lives = [living](FeatureId) { return living; };
+    for (int k = 0; k < 20; ++k) graph.Add(arc.poses()[11], 2.0, {}, {}, lives);
+    EXPECT_EQ(graph.size(), 12u);
+    EXPECT_EQ(graph.Pose(0).has_value(), living);
+  }
+}
+
 TEST(KeyframeGraph, ACameraThatOnlyTurnsHasNothingToAdjust) {
   KeyframeGraph graph{KeyframeGraphOptions()};
   Arc arc(12, 60, 0.002);
