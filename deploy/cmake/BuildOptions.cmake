@@ -43,7 +43,7 @@ function(saccade_executable name)
   saccade_precompile(${name} "${ARG_PCH}")
 endfunction()
 
-# KIND: eigen, vision or rpc; for tests also test_plain, test_eigen and test_vision.
+# KIND: eigen, vision or rpc; for tests test_eigen or test_vision.
 function(saccade_precompile name kind)
   if(kind AND NOT TARGET saccade_pch_${kind})
     message(FATAL_ERROR "saccade_precompile: unknown kind '${kind}'")
@@ -66,7 +66,7 @@ target_precompile_headers(saccade_pch_rpc PRIVATE <grpcpp/grpcpp.h> <memory> <st
 
 if(SACCADE_TESTS)
   find_package(GTest REQUIRED)
-  foreach(kind plain eigen vision)
+  foreach(kind eigen vision)
     add_library(saccade_pch_test_${kind} STATIC ${CMAKE_BINARY_DIR}/pch.cpp)
     target_link_libraries(saccade_pch_test_${kind} PRIVATE
       saccade_build_options Eigen3::Eigen GTest::gmock GTest::gtest_main)
