@@ -79,7 +79,7 @@ void AddRecord(CLI::App& app, RenderArguments& arguments) {
   CLI::App* record =
       app.add_subcommand("record", "Write the simulator as a recording with ground truth");
   record->add_option("--source", arguments.source, "sim:desk[?key=value&...]")->required();
-  record->add_option("--frames", arguments.frames, "Half-open range 0:B of frames");
+  record->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
   record->add_option("--out", arguments.out, "Folder in TUM layout to write")->required();
 }
 

@@ -1,5 +1,5 @@
 // A frozen picture: is it that frame, to the bit, and do clicks in it land where that frame saw things,
-// also after the server no longer keeps it?
+// also when it is older than the ring and the server holds it as a fetched still?
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { inCamera, length, minus } from './optics.mjs';
 import { decodePng, median, psnr } from './pictures.mjs';
