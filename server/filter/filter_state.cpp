@@ -22,6 +22,7 @@ void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance)
   anchors_.clear();
   features_.clear();
   updates_ = judged_ = 0;
+  next_anchor_ = 1;
   noise_scale_ = 1.0;
   covariance_.Assign(covariance);
   readout_s_ = options_.readout_s;
