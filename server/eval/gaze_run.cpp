@@ -36,14 +36,16 @@ absl::StatusOr<std::unique_ptr<GazeRun>> GazeRun::Create(const GazeRunOptions& o
   if (!truth.ok()) return truth.status();
   absl::StatusOr<OutputFile> gaze = OutputFile::Create(options.folder / "gaze.csv");
   if (!gaze.ok()) return gaze.status();
-  return std::unique_ptr<GazeRun>(new GazeRun(options, *std::move(source), std::move(mount),
-                                              *std::move(session), *std::move(recorder),
-                                              *std::move(truth), *std::move(gaze)));
+  absl::StatusOr<OutputFile> looks = OutputFile::Create(options.folder / "looks.csv");
+  if (!looks.ok()) return looks.status();
+  return std::unique_ptr<GazeRun>(
+      new GazeRun(options, *std::move(source), std::move(mount), *std::move(session),
+                  *std::move(recorder), *std::move(truth), *std::move(gaze), *std::move(looks)));
 }
 
 GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> source,
                  std::shared_ptr<SimMount> mount, TrackerSession session, RunRecorder recorder,
-                 OutputFile truth_file, OutputFile gaze_file)
+                 OutputFile truth_file, OutputFile gaze_file, OutputFile looks_file)
     : options_(options),
       mount_(std::move(mount)),
       source_(std::move(source)),
@@ -51,6 +53,7 @@ GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> sourc
       recorder_(std::move(recorder)),
       truth_file_(std::move(truth_file)),
       gaze_file_(std::move(gaze_file)),
+      looks_file_(std::move(looks_file)),
       loop_(std::make_unique<GazeLoop>(*mount_, options.gaze, [] { return "evaluation"; })),
       ring_(std::make_unique<FrameRing>()) {
   AnchorOptions anchor_options;
@@ -58,9 +61,29 @@ GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> sourc
   anchors_ = std::make_unique<AnchorManager>(
       anchor_options, [ring = ring_.get()](FrameId id) { return ring->Find(id); }, session_.seed);
   mount_->AdvanceTo(0);
+  looks_file_.Write(
+      "time_s,annotation,arrived_after_s,true_error_deg,believed_error_deg,anchor_off_across_cm,"
+      "anchor_off_along_cm,anchor_off_deg\n");
   truth_file_.Write("# timestamp tx ty tz qx qy qz qw   (camera in world, metres)\n");
   gaze_file_.Write(
       "time_s,mode,pan_deg,elevation_deg,cyclotorsion_deg,believed_error_deg,true_roll_deg\n");
+}
+
+void GazeRun::WriteLook(const Clicked& target, double begin_s, std::optional<double> arrival_s) {
+  const std::vector<Annotation> annotations = *anchors_->Latest();
+  const auto placed = std::find_if(annotations.begin(), annotations.end(),
+                                   [&](const Annotation& each) { return each.id == target.id; });
+  if (placed == annotations.end()) return;
+  const Eigen::Vector3d off = placed->anchor.point_in_world - target.true_point;
+  const Eigen::Vector3d line = target.true_point - TrueCamera().translation;
+  const double range = line.norm(), along = off.dot(line) / range;
+  const double across = std::sqrt(std::max(0.0, off.squaredNorm() - along * along));
+  const auto& believed = loop_->snapshot()->error_rad;
+  looks_file_.Write(absl::StrFormat(
+      "%.2f,%s,%s,%.3f,%s,%.2f,%.2f,%.3f\n", begin_s, target.id.substr(target.id.size() - 4),
+      arrival_s ? absl::StrFormat("%.2f", *arrival_s) : "", TrueError_deg(target.true_point),
+      believed ? absl::StrFormat("%.3f", *believed / kDegree) : "", 100 * across, 100 * along,
+      std::atan2(across, range) / kDegree));
 }
 
 absl::Status GazeRun::RunUntil(double time_s, const std::function<void()>& tick) {
@@ -202,7 +225,8 @@ GazeRun::DepthClaims GazeRun::CheckDepths() const {
 }
 
 absl::Status GazeRun::Close() {
-  for (const absl::Status& status : {recorder_.Close(), truth_file_.Close(), gaze_file_.Close()}) {
+  for (const absl::Status& status :
+       {recorder_.Close(), truth_file_.Close(), gaze_file_.Close(), looks_file_.Close()}) {
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

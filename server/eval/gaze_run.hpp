@@ -58,6 +58,9 @@ class GazeRun {
   /// newest tracked frame. An error says why the click was refused.
   absl::StatusOr<Clicked> Click(const std::optional<Eigen::Vector3d>& object);
 
+  /// A line in looks.csv: what became of a saccade to `target`, commanded at `begin_s`.
+  void WriteLook(const Clicked& target, double begin_s, std::optional<double> arrival_s);
+
   // Truth at the present moment.
   Rigid3 TrueCamera() const { return source_->WorldFromCameraAt(now_ns_); }
   double TrueError_deg(const Eigen::Vector3d& point_in_world) const;
@@ -81,7 +84,7 @@ class GazeRun {
  private:
   GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> source,
           std::shared_ptr<SimMount> mount, TrackerSession session, RunRecorder recorder,
-          OutputFile truth_file, OutputFile gaze_file);
+          OutputFile truth_file, OutputFile gaze_file, OutputFile looks_file);
   absl::Status TakeFrame();
   absl::Status Record(const Frame& frame, const FrameCost& cost);
   void Control();
@@ -91,7 +94,7 @@ class GazeRun {
   std::unique_ptr<SimSource> source_;
   TrackerSession session_;
   RunRecorder recorder_;
-  OutputFile truth_file_, gaze_file_;
+  OutputFile truth_file_, gaze_file_, looks_file_;
   std::unique_ptr<GazeLoop> loop_;
   std::unique_ptr<FrameRing> ring_;
   std::unique_ptr<AnchorManager> anchors_;

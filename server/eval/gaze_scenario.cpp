@@ -36,8 +36,9 @@ absl::StatusOr<GazeRun::Clicked> ClickUntil(GazeRun& run, double until_s,
 }
 
 /// A saccade, watched by truth for `for_s` seconds; the run goes on meanwhile.
-absl::Status Look(GazeRun& run, const GazeTarget& target, const Eigen::Vector3d& true_point,
-                  bool fast, double for_s, GazeResult& result) {
+absl::Status Look(GazeRun& run, const GazeRun::Clicked& target, bool fast, double for_s,
+                  GazeResult& result) {
+  const Eigen::Vector3d& true_point = target.true_point;
   ++result.asked;
   const double begin = run.time_s();
   // Past the target, in the plane of the approach: from 5 deg before it until 1.5 s later.
@@ -46,7 +47,7 @@ absl::Status Look(GazeRun& run, const GazeTarget& target, const Eigen::Vector3d&
   const Eigen::Vector3d rest = ToVector(run.mount().TrueAngles(run.now_ns()));
   double arrival = for_s, within_since = -1, moved = -1;
   bool arrived = false;
-  if (const absl::Status told = run.loop().Fixate(target, fast); !told.ok()) {
+  if (const absl::Status told = run.loop().Fixate(GazeAnnotation{target.id}, fast); !told.ok()) {
     std::cerr << "  refused: " << told.message() << "\n";
     result.arrival_s.Add(for_s);
     return run.RunUntil(begin + for_s);
@@ -75,6 +76,7 @@ absl::Status Look(GazeRun& run, const GazeTarget& target, const Eigen::Vector3d&
   });
   result.arrived += arrived ? 1 : 0;
   result.arrival_s.Add(arrival);
+  run.WriteLook(target, begin, arrived ? std::optional(arrival) : std::nullopt);
   if (moved >= 0) result.command_to_motion_ms.Add(1e3 * moved);
   return ran;
 }
@@ -108,9 +110,7 @@ absl::Status RunFixate(GazeRun& run, const SimArguments& arguments, GazeResult& 
   const absl::StatusOr<GazeRun::Clicked> clicked =
       ClickUntil(run, run.time_s() + 2.0, object, result);
   if (!clicked.ok()) return clicked.status();
-  if (absl::Status looked =
-          Look(run, GazeAnnotation{clicked->id}, clicked->true_point, false, 2.0, result);
-      !looked.ok()) {
+  if (absl::Status looked = Look(run, *clicked, false, 2.0, result); !looked.ok()) {
     return looked;
   }
   return run.RunUntil(arguments.duration_s, [&] {
@@ -141,7 +141,7 @@ absl::Status RunSaccade(GazeRun& run, std::uint64_t seed, bool fast, GazeResult&
       Towards(run, there.pan_rad / kDegree - side * 90.0, there.elevation_rad / kDegree);
   if (absl::Status told = run.loop().Fixate(start, false); !told.ok()) return told;
   if (absl::Status ran = run.RunUntil(run.time_s() + 4.2); !ran.ok()) return ran;
-  return Look(run, GazeAnnotation{clicked->id}, clicked->true_point, fast, 5.0, result);
+  return Look(run, *clicked, fast, 5.0, result);
 }
 
 absl::Status RunHorizon(GazeRun& run, const SimArguments& arguments, GazeResult& result) {
@@ -223,8 +223,7 @@ absl::Status RunTour(GazeRun& run, const SimArguments& arguments, std::uint64_t 
       next = std::uniform_int_distribution<std::size_t>(0, clicked.size() - 1)(rng);
     }
     last = next;
-    const absl::Status looked =
-        Look(run, GazeAnnotation{clicked[next].id}, clicked[next].true_point, false, 8.0, result);
+    const absl::Status looked = Look(run, clicked[next], false, 8.0, result);
     if (!looked.ok()) return looked;
   }
   if (absl::Status ran = run.RunUntil(arguments.duration_s); !ran.ok()) return ran;

@@ -146,15 +146,23 @@ AnchorPoseId FilterState::AddAnchor() {
   return next_anchor_++;
 }
 
+AnchorPoseId FilterState::AddAnchor(const Rigid3& world_from_camera, const Matrix6d& covariance) {
+  const int offset = covariance_.Append(kPoseDim);
+  if (mark_) mark_->journal.Add(Journal::Appended{kPoseDim});
+  covariance_.AddBlock(offset, covariance);
+  // Not young: its features have been measured often.
+  anchors_.push_back({next_anchor_, offset, 0, 0, world_from_camera, world_from_camera});
+  return next_anchor_++;
+}
+
 absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& birth) {
   const auto at = std::find_if(anchors_.begin(), anchors_.end(),
                                [&](const Anchor& a) { return a.id == anchor; });
   if (at == anchors_.end()) {
     return absl::InvalidArgumentError(absl::StrCat("filter: no pose clone ", anchor));
   }
-  if (!features_.empty() && birth.id <= features_.back().id) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("filter: feature id ", birth.id, " does not rise"));
+  if (Has(birth.id)) {
+    return absl::InvalidArgumentError(absl::StrCat("filter: feature id ", birth.id, " is taken"));
   }
   if (!(birth.inverse_range >= 0.0) || !(birth.inverse_range_sigma > 0.0) ||
       !std::isfinite(birth.inverse_range_sigma) || !birth.bearing.allFinite() ||
@@ -178,7 +186,10 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& bi
   if (size == 3) covariance_.AddBlock(feature.offset, tangent);
   covariance_.lower(feature.offset + size - 1, feature.offset + size - 1) =
       birth.inverse_range_sigma * birth.inverse_range_sigma;
-  features_.push_back(feature);
+  const auto behind =
+      std::upper_bound(features_.begin(), features_.end(), birth.id,
+                       [](FeatureId id, const Feature& each) { return id < each.id; });
+  features_.insert(behind, feature);
   ++at->users;
   return absl::OkStatus();
 }

@@ -140,8 +140,10 @@ class FilterState {
 
   /// Clones the camera's pose into the state, fully correlated.
   AnchorPoseId AddAnchor();
-  /// Starts a feature in a clone. InvalidArgument: unknown anchor, id not rising, numbers not
-  /// usable.
+  /// Puts a pose into the state that a camera once had and that is known from elsewhere, with an
+  /// error of its own: covariance (6 x 6) of [position (world), rotation (local)].
+  AnchorPoseId AddAnchor(const Rigid3& world_from_camera, const Matrix6d& covariance);
+  /// Starts a feature in a clone. InvalidArgument: unknown anchor, id taken, numbers not usable.
   absl::Status AddFeature(AnchorPoseId anchor, const FeatureBirth& birth);
   /// Removes features (unknown ids are ignored), and the clones that then carry none.
   void Remove(std::span<const FeatureId> ids);

@@ -29,8 +29,7 @@ void KeyframeGraph::Clear() {
 
 KeyframeId KeyframeGraph::Add(const Rigid3& world_from_camera, double distance_m,
                               std::span<const GraphSighting> sightings,
-                              std::span<const GraphBirth> births,
-                              const std::function<bool(FeatureId)>& lives) {
+                              std::span<const GraphBirth> births, const LifeOf& life) {
   const KeyframeId id = next_++;
   Keyframe& keyframe = keyframes_[id];
   keyframe.world_from_camera = world_from_camera;
@@ -44,19 +43,30 @@ KeyframeId KeyframeGraph::Add(const Rigid3& world_from_camera, double distance_m
     points_[birth.id] = {id, birth, {birth.bearing, birth.inverse_range}, {}};
     keyframe.births.push_back(birth.id);
   }
-  Thin(lives);
+  Thin(life);
   return id;
 }
 
-void KeyframeGraph::Thin(const std::function<bool(FeatureId)>& lives) {
-  const auto dead = [&](const auto& entry) {
-    return !lives || std::none_of(entry.second.births.begin(), entry.second.births.end(), lives);
-  };
-  while (static_cast<int>(keyframes_.size()) > options_.max_keyframes) {
-    const auto newest = std::prev(keyframes_.end());
-    const auto oldest = std::find_if(keyframes_.begin(), newest, dead);
-    Erase(oldest == newest ? keyframes_.begin()->first : oldest->first);
+KeyframeId KeyframeGraph::LeastWorth(const LifeOf& life) const {
+  KeyframeId least = keyframes_.begin()->first;
+  int least_worth = static_cast<int>(Life::kInFilter) + 1;
+  const auto newest = std::prev(keyframes_.end());
+  for (auto at = keyframes_.begin(); at != newest && least_worth > 0; ++at) {
+    int worth = 0;
+    if (life) {
+      for (const FeatureId id : at->second.births) {
+        worth = std::max(worth, static_cast<int>(life(id)));
+      }
+    }
+    if (worth >= least_worth) continue;
+    least_worth = worth;
+    least = at->first;
   }
+  return least;
+}
+
+void KeyframeGraph::Thin(const LifeOf& life) {
+  while (static_cast<int>(keyframes_.size()) > options_.max_keyframes) Erase(LeastWorth(life));
   if (static_cast<int>(keyframes_.size()) <= options_.dense_keyframes + 1) return;
   const auto old = std::prev(keyframes_.end(), options_.dense_keyframes + 1);
   if (old == keyframes_.begin() || !old->second.births.empty()) return;
@@ -91,6 +101,19 @@ std::optional<Rigid3> KeyframeGraph::Pose(KeyframeId id) const {
 void KeyframeGraph::SetPose(KeyframeId id, const Rigid3& world_from_camera) {
   const auto at = keyframes_.find(id);
   if (at != keyframes_.end()) at->second.world_from_camera = world_from_camera;
+}
+
+std::optional<KeyframeGraph::Remembered> KeyframeGraph::Remember(FeatureId id) const {
+  const auto at = points_.find(id);
+  if (at == points_.end()) return std::nullopt;
+  const Point& point = at->second;
+  return Remembered{point.anchor, keyframes_.at(point.anchor).world_from_camera, point.estimate,
+                    point.birth.sigma_rad};
+}
+
+void KeyframeGraph::SetEstimate(FeatureId id, const GraphEstimate& estimate) {
+  const auto at = points_.find(id);
+  if (at != points_.end()) at->second.estimate = estimate;
 }
 
 KeyframeGraph::Ranked KeyframeGraph::WhoSees(std::span<const FeatureId> points) const {

@@ -41,7 +41,7 @@ struct KeyframeGraphOptions {
   int dense_keyframes = 40;       // the newest are all kept; before them, only those that are apart
   double apart_share = 0.05;      // of the distance to what is in view
   double apart_rad = 0.12;        // 7 deg
-  int max_keyframes = 600;        // then the oldest go that no living feature was born in
+  int max_keyframes = 600;        // then the oldest go that no feature in use was born in
   int adjusted_keyframes = 30;    // newest, and those that share most points with them
   int held_keyframes = 15;        // around them, fixed
   int max_points = 300;           // adjusted at once
@@ -58,11 +58,14 @@ class KeyframeGraph {
 
   void Clear();
   std::size_t size() const { return keyframes_.size(); }
-  /// `distance_m`: typical, to what is in view. `lives`: whether a feature is still in the filter;
-  /// what the graph forgets of those would tear them from the rest at the next adjustment.
+  /// What a feature still is to the tracker. What the graph forgets of those in the filter would
+  /// tear them from the rest at the next adjustment; of those at rest, they are lost.
+  enum class Life { kGone, kAtRest, kInFilter };
+  using LifeOf = std::function<Life(FeatureId)>;
+  /// `distance_m`: typical, to what is in view.
   KeyframeId Add(const Rigid3& world_from_camera, double distance_m,
                  std::span<const GraphSighting> sightings, std::span<const GraphBirth> births,
-                 const std::function<bool(FeatureId)>& lives = {});
+                 const LifeOf& life = {});
   /// The newest keyframe's pose; nothing if there is none.
   std::optional<Rigid3> Newest() const;
   std::optional<Rigid3> Pose(KeyframeId id) const;
@@ -79,6 +82,20 @@ class KeyframeGraph {
   /// `estimate`: a feature as the filter has it now, if it still does. Nothing while too few points
   /// show parallax: a camera that only turns has nothing to adjust.
   std::optional<Job> MakeJob(const Lookup& estimate) const;
+  /// A point as the graph has it, and the pose that it was first seen from.
+  struct Remembered {
+    KeyframeId anchor = 0;
+    Rigid3 world_from_anchor;
+    GraphEstimate estimate;
+    double bearing_sigma_rad = 1e-3;
+    /// [m]; the inverse range must be above 0.
+    Eigen::Vector3d PointInWorld() const {
+      return world_from_anchor * (estimate.bearing / estimate.inverse_range);
+    }
+  };
+  std::optional<Remembered> Remember(FeatureId id) const;
+  /// The filter's last word on a feature that leaves it.
+  void SetEstimate(FeatureId id, const GraphEstimate& estimate);
   /// Takes an adjusted job over; keyframes added meanwhile move along with the newest of the job.
   void Take(const Job& job);
 
@@ -97,7 +114,9 @@ class KeyframeGraph {
   };
   using Ranked = std::vector<std::pair<int, KeyframeId>>;
 
-  void Thin(const std::function<bool(FeatureId)>& lives);
+  void Thin(const LifeOf& life);
+  /// The oldest of those whose births are worth least now.
+  KeyframeId LeastWorth(const LifeOf& life) const;
   void Erase(KeyframeId id);
   /// Keyframes that see these points, most of them first.
   Ranked WhoSees(std::span<const FeatureId> points) const;

@@ -4,6 +4,13 @@
 
 namespace saccade {
 
+void LandmarkMap::Add(Landmark landmark) {
+  const auto behind =
+      std::upper_bound(landmarks_.begin(), landmarks_.end(), landmark.id,
+                       [](FeatureId id, const Landmark& each) { return id < each.id; });
+  landmarks_.insert(behind, std::move(landmark));
+}
+
 void LandmarkMap::Remove(std::span<const FeatureId> ids) {
   std::erase_if(landmarks_, [&](const Landmark& landmark) {
     return std::find(ids.begin(), ids.end(), landmark.id) != ids.end();

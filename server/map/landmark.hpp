@@ -29,6 +29,12 @@ struct Landmark {
   std::uint32_t failed_in_row = 0;  // newest attempts without success
   std::int64_t last_matched_frame = -1;
   double recent = 1.0;  // smoothed share of attempts that succeeded, about the last 20
+  /// Since it was last woken (DormantLandmarks); nothing: it never slept.
+  struct Probation {
+    std::uint32_t attempted = 0, matched = 0;
+    int failures = 0;  // earlier times that it was not found
+  };
+  std::optional<Probation> woken;
 
   /// Books one attempt.
   void Record(bool success, std::int64_t frame) {
@@ -37,6 +43,10 @@ struct Landmark {
     failed_in_row = success ? 0 : failed_in_row + 1;
     recent += 0.05 * ((success ? 1.0 : 0.0) - recent);
     if (success) last_matched_frame = frame;
+    if (woken) {
+      ++woken->attempted;
+      woken->matched += success ? 1 : 0;
+    }
   }
 };
 
@@ -45,7 +55,7 @@ class LandmarkMap {
  public:
   /// The next free id; ids are never used twice, not even after Clear().
   FeatureId NextId() { return next_id_++; }
-  void Add(Landmark landmark) { landmarks_.push_back(std::move(landmark)); }
+  void Add(Landmark landmark);
   void Remove(std::span<const FeatureId> ids);
   void Clear() { landmarks_.clear(); }
 

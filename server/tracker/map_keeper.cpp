@@ -15,6 +15,7 @@ CornerOptions MakeCornerOptions(const TrackerOptions& options) {
 
 constexpr int kDepthFeatures = 8;        // needed to guess the depth of a new one
 constexpr int kFramesBetweenGrowth = 5;  // unless the view is nearly empty
+constexpr std::uint32_t kProbation = 8;  // attempts that a woken landmark has
 
 }  // namespace
 
@@ -47,35 +48,45 @@ std::optional<MapKeeper::DepthGuess> MapKeeper::GuessDepth(const FilterState& fi
   return DepthGuess{median, 0.5 * median};
 }
 
-void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map) {
+void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map,
+                       const Rest& rest) {
   std::vector<FeatureId> gone = filter.RemoveBehind();
+  std::vector<FeatureId> resting;
   const std::vector<FeatureId> unreliable = Unreliable(map, RetirementOptions());
-  gone.insert(gone.end(), unreliable.begin(), unreliable.end());
-  filter.Remove(unreliable);
-  if (options_.forget_after > 0) {
-    for (const Landmark& landmark : map.all()) {
-      if (!landmark.known && landmark.matched > 0 &&
-          landmark.last_matched_frame < frame - options_.forget_after) {
-        gone.push_back(landmark.id);
-      }
-    }
-    filter.Remove(gone);
+  for (const FeatureId id : unreliable) {
+    (map.Find(id)->woken ? resting : gone).push_back(id);
   }
+  filter.Remove(gone);
   map.Remove(gone);
-  const int excess = static_cast<int>(filter.feature_count()) - options_.max_features;
-  if (excess > 0) {
-    const std::vector<FeatureId> least = LeastWorth(map, excess, frame);
-    filter.Remove(least);
-    map.Remove(least);
+  for (const Landmark& landmark : map.all()) {
+    if (landmark.known) continue;
+    const bool unseen = options_.rest_after > 0 && landmark.matched > 0 &&
+                        landmark.last_matched_frame < frame - options_.rest_after;
+    if (unseen || FailsProbation(landmark)) resting.push_back(landmark.id);
   }
+  std::sort(resting.begin(), resting.end());
+  resting.erase(std::unique(resting.begin(), resting.end()), resting.end());
+  if (!resting.empty()) rest(resting);
+  const int excess = static_cast<int>(filter.feature_count()) - options_.max_features;
+  if (excess > 0) rest(LeastWorth(map, excess, frame));
 }
 
-bool MapKeeper::Wants(const FrameMatches& matches, const FilterState&) const {
+bool MapKeeper::FailsProbation(const Landmark& landmark) {
+  return landmark.woken && landmark.woken->attempted >= kProbation &&
+         landmark.woken->attempted < 4 * kProbation &&
+         4 * landmark.woken->matched < landmark.woken->attempted;
+}
+
+int MapKeeper::Missing(const FrameMatches& matches) const {
   int usable = 0;
   for (const LandmarkMatch& match : matches.in_view) {
     usable += match.searched || match.weight > 0 ? 1 : 0;
   }
-  const int missing = options_.features_in_view - usable;
+  return options_.features_in_view - usable;
+}
+
+bool MapKeeper::Wants(const FrameMatches& matches) const {
+  const int missing = Missing(matches);
   if (missing <= 0) return false;
   if (missing > options_.features_in_view / 2) return true;
   return missing >= options_.features_in_view / 8 && frames_since_growth_ >= kFramesBetweenGrowth;
@@ -123,7 +134,7 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
                     const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
                     FilterState& filter, LandmarkMap& map, std::mt19937_64& random) {
   ++frames_since_growth_;
-  if (!everywhere && !Wants(matches, filter)) return 0;
+  if (!everywhere && !Wants(matches)) return 0;
   std::vector<Eigen::Vector2d> occupied;
   for (const LandmarkMatch& match : matches.in_view) occupied.push_back(match.pixel);
   const int wanted = everywhere ? options_.features_in_view : options_.births_per_clone;

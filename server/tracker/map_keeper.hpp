@@ -1,7 +1,9 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "server/capture/frame.hpp"
@@ -28,8 +30,15 @@ class MapKeeper {
   static std::optional<DepthGuess> GuessDepth(const FilterState& filter,
                                               const FrameMatches& matches);
 
-  /// Removes what is unreliable or impossible, and, in a full map, what is worth least.
-  void Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map);
+  /// Takes features out of filter and map that may be of use later.
+  using Rest = std::function<void(std::span<const FeatureId>)>;
+  /// Removes what is unreliable or impossible; what is out of sight, was woken in vain or, in a
+  /// full map, is worth least goes to `rest`.
+  void Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest);
+  /// A woken landmark that is hardly ever found where it was thought to be.
+  static bool FailsProbation(const Landmark& landmark);
+  /// How many more features the map wants in view.
+  int Missing(const FrameMatches& matches) const;
   /// Starts features in a new pose clone, where the picture has corners and the map has none.
   /// `everywhere`: as many as the map wants in view (the first frame). Returns how many.
   int Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
@@ -44,7 +53,7 @@ class MapKeeper {
                                  const FrameMatcher& matcher, FilterState& filter,
                                  LandmarkMap& map);
   /// True if Grow() would start features now.
-  bool Wants(const FrameMatches& matches, const FilterState& filter) const;
+  bool Wants(const FrameMatches& matches) const;
 
  private:
   TrackerOptions options_;

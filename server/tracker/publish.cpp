@@ -38,7 +38,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
   snapshot->map_revision = revision_;
   snapshot->map_generation = generation_;
   snapshot->stage_ms = times;
-  snapshot->features.reserve(map_.all().size());
+  snapshot->features.reserve(map_.all().size() + dormant_.size());
   auto match = matches_.in_view.begin();  // both lists have rising ids
   const Eigen::Matrix3d turn = camera.world_from_camera.RotationMatrix();
   for (const Landmark& landmark : map_.all()) {
@@ -66,6 +66,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
       feature.state = match->accepted() ? FeatureState::kMeasured : FeatureState::kFailed;
     }
   }
+  PublishDormant(*snapshot);
   return snapshot;
 }
 

@@ -19,17 +19,6 @@ constexpr double kVelocityShare_1_s = 0.5;
 constexpr double kAngularVelocitySigma_rad_s = 1.0;
 constexpr double kFoundSigma_px = 1.5;
 
-/// Where the map's features are now.
-Relocaliser::PointLookup PointsNow(const LandmarkMap& map, const FilterState& filter) {
-  return [&map, &filter](FeatureId id) -> std::optional<Eigen::Vector3d> {
-    const Landmark* landmark = map.Find(id);
-    if (landmark == nullptr) return std::nullopt;
-    if (landmark->known) return landmark->known->point_in_world;
-    if (!filter.Has(id)) return std::nullopt;
-    return filter.Marginal(id).point_in_world;
-  };
-}
-
 }  // namespace
 
 void Tracker::Impl::KeepKeyframe(const Frame& frame) {
@@ -37,7 +26,7 @@ void Tracker::Impl::KeepKeyframe(const Frame& frame) {
   const Rigid3& pose = filter_.camera().world_from_camera;
   const double distance = kKeyframeShare / std::max(1e-6, depth_.inverse_range);
   if (!relocaliser_.NeedsKeyframe(pose, distance, kKeyframeAngle_rad)) {
-    relocaliser_.Densify(*frame.camera, PointsNow(map_, filter_));
+    relocaliser_.Densify(*frame.camera, [this](FeatureId id) { return PointNow(id); });
     return;
   }
   std::vector<KeyframePoint> points;
@@ -60,9 +49,10 @@ void Tracker::Impl::KeepKeyframe(const Frame& frame) {
 void Tracker::Impl::Recover(const Frame& frame) {
   matches_ = FrameMatches();
   if (frames_lost_++ % kQueryEvery != 0) return;
-  const auto found = relocaliser_.Query(frame.grey, *frame.camera, PointsNow(map_, filter_));
+  const auto found =
+      relocaliser_.Query(frame.grey, *frame.camera, [this](FeatureId id) { return PointNow(id); });
   if (!found) return;
-  before_relocalisation_ = std::make_shared<Backup>(Backup{filter_});
+  before_relocalisation_ = std::make_shared<Backup>(Backup{filter_, map_, dormant_});
   if (!Accept(*found, *frame.camera)) {
     Revert();
     return;
@@ -82,6 +72,11 @@ bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camer
   CameraMotion motion;
   motion.world_from_camera = found.world_from_camera;
   filter_.ResetCamera(motion, sigma.cwiseAbs2().asDiagonal());
+  for (const Correspondence& inlier : found.inliers) {
+    const auto known = refiner_.Remember(inlier.id);
+    if (!dormant_.Has(inlier.id) || !known) continue;
+    WakeOne(inlier.id, refiner_.CloneOf(known->anchor, WakeCovariance(unit), filter_), *known);
+  }
   std::vector<Observation> observations;
   for (const Correspondence& inlier : found.inliers) {
     const Landmark* landmark = map_.Find(inlier.id);
@@ -99,6 +94,9 @@ bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camer
 void Tracker::Impl::Revert() {
   if (before_relocalisation_ == nullptr) return;
   filter_ = before_relocalisation_->filter;
+  map_ = before_relocalisation_->map;
+  dormant_ = before_relocalisation_->dormant;
+  refiner_.ForgetClones(filter_);
   before_relocalisation_.reset();
 }
 
@@ -153,7 +151,7 @@ absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
   const AnchorPoseId anchor = filter_.AddAnchor();
   const auto id = keeper_.Plant(last_frame_, seen.pixel, depth, anchor, matcher_, filter_, map_);
   filter_.Remove({});
-  refiner_.Keep(camera, filter_, matches_, depth_.inverse_range);
+  Remember(camera);
   if (!id) return absl::NotFoundError("feature: no texture to track at this pixel");
   map_.Find(*id)->seeded = true;
   return *id;

@@ -50,7 +50,8 @@ void Refiner::Reset() {
 }
 
 void Refiner::Keep(const CameraModel& camera, const FilterState& filter,
-                   const FrameMatches& matches, double inverse_range) {
+                   const FrameMatches& matches, double inverse_range,
+                   const KeyframeGraph::LifeOf& life) {
   if (!options_.adjust) return;
   const double focal = 0.5 * (camera.intrinsics().fx + camera.intrinsics().fy);
   std::vector<GraphBirth> births;
@@ -80,8 +81,7 @@ void Refiner::Keep(const CameraModel& camera, const FilterState& filter,
     }
     sightings.push_back(sighting);
   }
-  const KeyframeId id = graph_.Add(pose, distance, sightings, births,
-                                   [&](FeatureId feature) { return filter.Has(feature); });
+  const KeyframeId id = graph_.Add(pose, distance, sightings, births, life);
   if (clone) clones_[id] = *clone;
   if (!ids.empty()) newest_feature_ = std::max(newest_feature_, ids.back());
 }
@@ -99,6 +99,20 @@ void Refiner::Start(std::int64_t frame, FilterState& filter) {
     if (AdjustBundle(job.problem, stop_)) done = std::move(job);
     return done;
   });
+}
+
+void Refiner::Rest(FeatureId id, const FilterState& filter) {
+  if (const auto estimate = EstimateOf(filter, id)) graph_.SetEstimate(id, *estimate);
+}
+
+AnchorPoseId Refiner::CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter) {
+  const auto known = clones_.find(id);
+  if (known != clones_.end() && filter.AnchorPose(known->second)) return known->second;
+  return clones_[id] = filter.AddAnchor(*graph_.Pose(id), covariance);
+}
+
+void Refiner::ForgetClones(const FilterState& filter) {
+  std::erase_if(clones_, [&](const auto& entry) { return !filter.AnchorPose(entry.second); });
 }
 
 void Refiner::Wait() const {
@@ -141,7 +155,7 @@ void Refiner::Put(const KeyframeGraph::Job& job, FilterState& filter) {
     refinement.features[job.points[k]] = {point.bearing, point.inverse_range};
   }
   filter.Refine(refinement);
-  std::erase_if(clones_, [&](const auto& entry) { return !filter.AnchorPose(entry.second); });
+  ForgetClones(filter);
   for (auto it = clones_.upper_bound(job.newest); it != clones_.end(); ++it) {
     graph_.SetPose(it->first, *filter.AnchorPose(it->second));
   }

@@ -34,12 +34,22 @@ class Refiner {
   /// Remembers this frame, after its births and before anything else happens to the filter, if
   /// features were born in it or the camera has moved enough.
   void Keep(const CameraModel& camera, const FilterState& filter, const FrameMatches& matches,
-            double inverse_range);
+            double inverse_range, const KeyframeGraph::LifeOf& life);
   /// Starts an adjustment if there is something new and none is running.
   void Start(std::int64_t frame, FilterState& filter);
   /// Puts a finished one into the filter. True: the camera jumped by it, seen against the distance
   /// to what is in view.
   bool Finish(std::int64_t frame, double inverse_range, FilterState& filter);
+  /// What the keyframes know of a feature that has left the filter.
+  std::optional<KeyframeGraph::Remembered> Remember(FeatureId id) const {
+    return graph_.Remember(id);
+  }
+  /// A feature is about to leave the filter.
+  void Rest(FeatureId id, const FilterState& filter);
+  /// The clone that stands for a keyframe, put into the filter anew if it has left.
+  AnchorPoseId CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter);
+  /// The filter was put back to what it was: clones since then are unknown again.
+  void ForgetClones(const FilterState& filter);
   /// Returns when no adjustment is being computed any more.
   void Wait() const;
   /// What Finish() has waited in this frame [ms].

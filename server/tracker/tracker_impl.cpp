@@ -41,6 +41,7 @@ Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
       options_(options),
       random_(options.seed),
       filter_(MakeFilterOptions(options, *source.camera)),
+      dormant_(DormantOptions()),
       matcher_(options),
       keeper_(options),
       starter_(source, options),
@@ -51,6 +52,7 @@ Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
 void Tracker::Impl::Reset() {
   filter_.Reset(CameraMotion(), Matrix12d::Zero());
   map_.Clear();
+  dormant_.Clear();
   keeper_.Reset();
   starter_.Reset();
   monitor_.Reset();
@@ -112,7 +114,7 @@ void Tracker::Impl::Begin(const Frame& frame) {
   const int born = static_cast<int>(filter_.feature_count());
   matches_.attempted += born;
   matches_.accepted += born;
-  refiner_.Keep(*frame.camera, filter_, matches_, depth_.inverse_range);
+  Remember(*frame.camera);
   if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
 }
 
@@ -145,6 +147,7 @@ void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
   // Once: in a row of blind frames every widening would make the next search more hopeless.
   const bool followed = matches_.accepted >= options_.coasting_below;
   filter_.Predict(dt, noise, head ? &*head : nullptr);
+  Wake(camera);
   times_.predict_ms = watch.Lap_ms();
   matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
   if (matches_.surprised && followed) {
@@ -248,7 +251,7 @@ void Tracker::Impl::Manage(const Frame& frame) {
       return std::holds_alternative<Eigen::Vector3d>(match.point);
     });
   }
-  keeper_.Retire(frames_, filter_, map_);
+  keeper_.Retire(frames_, filter_, map_, [this](std::span<const FeatureId> ids) { Rest(ids); });
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;
@@ -259,7 +262,7 @@ void Tracker::Impl::Manage(const Frame& frame) {
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
                random_);
-  refiner_.Keep(*frame.camera, filter_, matches_, depth_.inverse_range);
+  Remember(*frame.camera);
   refiner_.Start(frames_, filter_);
   KeepKeyframe(frame);
 }

@@ -3,6 +3,7 @@
 #include <memory>
 #include <random>
 
+#include "server/map/dormant_landmarks.hpp"
 #include "server/map/relocaliser.hpp"
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/map_keeper.hpp"
@@ -39,6 +40,19 @@ class Tracker::Impl {
   /// Errors are counted from where the camera is, not from where it once began (server/filter,
   /// gauge).
   void MoveHome();
+  /// Takes features out of the filter; those that are well known are only put to rest.
+  void Rest(std::span<const FeatureId> ids);
+  /// Takes landmarks at rest back that should be in view, where the filter has too few.
+  void Wake(const CameraModel& camera);
+  void WakeOne(FeatureId id, AnchorPoseId clone, const KeyframeGraph::Remembered& known);
+  /// Of where a keyframe was, when its landmarks are woken.
+  Matrix6d WakeCovariance(double distance_m) const;
+  /// The refiner remembers this frame.
+  void Remember(const CameraModel& camera);
+  /// Of a feature, in the filter or at rest; nothing if it is neither.
+  std::optional<Eigen::Vector3d> PointNow(FeatureId id) const;
+  /// Landmarks at rest, as the keyframes have them.
+  void PublishDormant(MapSnapshot& snapshot) const;
   void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
   bool Settled() const;
@@ -49,6 +63,7 @@ class Tracker::Impl {
   std::mt19937_64 random_;
   FilterState filter_;
   LandmarkMap map_;
+  DormantLandmarks dormant_;
   FrameMatcher matcher_;
   MapKeeper keeper_;
   Starter starter_;

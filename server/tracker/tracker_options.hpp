@@ -51,12 +51,15 @@ struct TrackerOptions {
   bool warp = true;              // patches are drawn as seen from here; false: as first seen
 
   // Map.
-  int features_in_view = 80;         // new ones are started below
-  int max_features = 250;            // in the filter; update time grows with the square
-  int forget_after = 0;              // frames out of sight, then a feature goes; 0: never
-  int births_per_clone = 15;         // features that share one pose clone (slam-spec 5.4)
-  double corner_min_score = 2000.0;  // see CornerOptions; plain walls must still give some
-  double initial_depth_m = 1.0;      // of the first features without a target: sets the scale
+  int features_in_view = 80;  // new ones are started below
+  int max_features = 250;     // in the filter; update time grows with the square
+  int rest_after = 0;  // frames out of sight, then a feature leaves the filter; 0: when it is full
+  bool wake = true;    // what left well measured is taken back where it comes into view again
+  double wake_position_share = 0.01;   // sigma of where it was seen from, of the distance...
+  double wake_angle_sigma_rad = 0.01;  // ...and of that camera's direction
+  int births_per_clone = 15;           // features that share one pose clone (slam-spec 5.4)
+  double corner_min_score = 2000.0;    // see CornerOptions; plain walls must still give some
+  double initial_depth_m = 1.0;        // of the first features without a target: sets the scale
 
   // Bundle adjustment on another core.
   bool adjust = true;

@@ -175,6 +175,48 @@ TEST(FilterState, CountingErrorsFromACloneKeepsWhatIsSeenFromElsewhere) {
   EXPECT_EQ((pose.translation - run.filter_.camera().world_from_camera.translation).norm(), 0.0);
 }
 
+TEST(FilterState, APoseFromElsewhereHasAnErrorOfItsOwn) {
+  Simulation run(6, 30, FilterOptions());
+  run.BirthAll(0.5, 0.25, 0.3);
+  for (int k = 1; k < 90; ++k) run.Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.3);
+  const auto error = [&] {
+    return (run.filter_.camera().world_from_camera.translation - run.truth_.translation).norm();
+  };
+  const double error_before = error();
+  // Ten of them leave and come back, on a clone that is 3 cm and 1 deg from where it was.
+  const AnchoredPoint first = run.filter_.Point(3);
+  std::vector<FeatureBirth> births;
+  for (FeatureId id = 3; id < 13; ++id) {
+    if (!run.filter_.Has(id)) continue;
+    const AnchoredPoint known = run.filter_.Point(id);
+    births.push_back({id, known.bearing, 1e-7 * Eigen::Matrix3d::Identity(), known.inverse_range,
+                      run.filter_.Marginal(id).inverse_range_sigma});
+  }
+  ASSERT_GT(births.size(), 5u);
+  for (const FeatureBirth& birth : births) run.filter_.Remove(std::vector<FeatureId>{birth.id});
+  const Rigid3 right = first.world_from_anchor;
+  const Rigid3 wrong = {right.rotation * ExpQuaternion({0.01, -0.01, 0.01}),
+                        right.translation + Eigen::Vector3d(0.02, -0.02, 0.01)};
+  Vector6 sigma;
+  sigma << 0.02, 0.02, 0.02, 0.01, 0.01, 0.01;
+  const int offset = run.filter_.dim();
+  const AnchorPoseId clone = run.filter_.AddAnchor(wrong, sigma.cwiseAbs2().asDiagonal());
+  for (const FeatureBirth& birth : births) {
+    ASSERT_TRUE(run.filter_.AddFeature(clone, birth).ok());
+    EXPECT_FALSE(run.filter_.AddFeature(clone, birth).ok()) << "the id is taken";
+  }
+  const Eigen::MatrixXd p = run.filter_.FullCovariance();
+  EXPECT_EQ(p.block(offset, 0, 6, offset).norm(), 0.0);
+  const std::vector<FeatureId> ids = run.filter_.FeatureIds();
+  EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end()));
+  for (int k = 90; k < 120; ++k) run.Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.3);
+  const Rigid3 found = *run.filter_.AnchorPose(clone);
+  EXPECT_LT((found.translation - right.translation).norm(), 0.01);
+  EXPECT_LT(RotationAngle(found, right), 0.005);
+  // What stayed was known far better, and hardly moves for it.
+  EXPECT_LT(error(), error_before + 0.01);
+}
+
 TEST(FilterState, KalmanAndInformationFormAgreeT4) {
   // The same observations once as one batch of known points (more rows than states: information
   // form), once computed here by the textbook's Kalman form.

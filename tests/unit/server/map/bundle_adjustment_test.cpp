@@ -213,18 +213,42 @@ TEST(KeyframeGraph, AJobOutlivesWhatItWasMadeOf) {
   EXPECT_EQ(graph.size(), 12u);
 }
 
-TEST(KeyframeGraph, KeepsWhatLivingFeaturesWereBornIn) {
-  for (const bool living : {true, false}) {
+TEST(KeyframeGraph, KeepsWhatFeaturesInUseWereBornIn) {
+  using Life = KeyframeGraph::Life;
+  for (const Life life : {Life::kInFilter, Life::kAtRest, Life::kGone}) {
     KeyframeGraphOptions options;
     options.dense_keyframes = options.max_keyframes = 12;
     KeyframeGraph graph(options);
     Arc arc(12, 60, 0.5);
     Fill(graph, arc);  // keyframe 0 gives birth to all
-    const auto lives = [living](FeatureId) { return living; };
-    for (int k = 0; k < 20; ++k) graph.Add(arc.poses()[11], 2.0, {}, {}, lives);
+    for (int k = 0; k < 20; ++k) {
+      graph.Add(arc.poses()[11], 2.0, {}, {}, [life](FeatureId) { return life; });
+    }
     EXPECT_EQ(graph.size(), 12u);
-    EXPECT_EQ(graph.Pose(0).has_value(), living);
+    EXPECT_EQ(graph.Pose(0).has_value(), life != Life::kGone);
   }
+}
+
+TEST(KeyframeGraph, ForgetsWhatIsAtRestBeforeWhatIsInTheFilter) {
+  using Life = KeyframeGraph::Life;
+  KeyframeGraphOptions options;
+  options.dense_keyframes = options.max_keyframes = 6;
+  KeyframeGraph graph(options);
+  Arc arc(6, 60, 0.5);
+  for (int k = 0; k < 6; ++k) {  // one birth each
+    const std::vector<GraphBirth> birth = {
+        {static_cast<FeatureId>(k + 1), arc.Ray(k, k), kSigma_rad, 0.5, 0.25}};
+    graph.Add(arc.poses()[k], 2.0, {}, birth);
+  }
+  const auto odd_ones_rest = [](FeatureId id) {
+    return id > 6 ? Life::kGone : id % 2 == 1 ? Life::kAtRest : Life::kInFilter;
+  };
+  const std::vector<GraphBirth> last = {{7, arc.Ray(5, 7), kSigma_rad, 0.5, 0.25}};
+  graph.Add(arc.poses()[5], 2.0, {}, last, odd_ones_rest);
+  EXPECT_FALSE(graph.Pose(0).has_value()) << "the oldest of those at rest goes first";
+  EXPECT_TRUE(graph.Pose(1).has_value());
+  EXPECT_FALSE(graph.Remember(1).has_value());
+  EXPECT_TRUE(graph.Remember(2).has_value());
 }
 
 TEST(KeyframeGraph, ACameraThatOnlyTurnsHasNothingToAdjust) {

@@ -1,0 +1,69 @@
+#include "server/map/dormant_landmarks.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace saccade {
+
+void DormantLandmarks::Put(DormantLandmark landmark) {
+  const FeatureId id = landmark.landmark.id;
+  landmarks_.insert_or_assign(id, std::move(landmark));
+  if (static_cast<int>(landmarks_.size()) <= options_.max_landmarks) return;
+  landmarks_.erase(
+      std::min_element(landmarks_.begin(), landmarks_.end(), [](const auto& a, const auto& b) {
+        return a.second.landmark.matched < b.second.landmark.matched;
+      }));
+}
+
+DormantLandmark DormantLandmarks::Take(FeatureId id) {
+  return std::move(landmarks_.extract(id).mapped());
+}
+
+void DormantLandmarks::Forget(const Lookup& lookup) {
+  std::erase_if(landmarks_, [&](const auto& entry) { return !lookup(entry.first); });
+}
+
+std::vector<std::pair<KeyframeId, std::vector<FeatureId>>> DormantLandmarks::InView(
+    const CameraModel& camera, const Rigid3& world_from_camera, std::int64_t frame, int wanted,
+    std::span<const Eigen::Vector2d> occupied, const Lookup& lookup) const {
+  const Rigid3 camera_from_world = world_from_camera.Inverse();
+  std::map<KeyframeId, std::vector<FeatureId>> by_keyframe;
+  for (const auto& [id, dormant] : landmarks_) {
+    if (frame < dormant.rests_until) continue;
+    const auto known = lookup(id);
+    if (!known || !(known->estimate.inverse_range > 0.0)) continue;
+    const double range = 1.0 / known->estimate.inverse_range;
+    const Eigen::Vector3d ray = known->world_from_anchor.rotation * known->estimate.bearing;
+    const Eigen::Vector3d point = known->PointInWorld();
+    const Eigen::Vector3d seen = camera_from_world * point;
+    const double distance = seen.norm();
+    if (seen.z() < 0.2 * distance || distance * options_.max_scale < range ||
+        distance > options_.max_scale * range) {
+      continue;
+    }
+    const double cosine = ray.dot(point - world_from_camera.translation) / distance;
+    if (cosine < std::cos(options_.max_view_angle_rad)) continue;
+    const auto pixel = camera.Project(seen);
+    if (!pixel || !camera.InImage(*pixel, options_.border_px)) continue;
+    const auto near = [&](const Eigen::Vector2d& other) {
+      return (other - *pixel).squaredNorm() < options_.apart_px * options_.apart_px;
+    };
+    if (std::any_of(occupied.begin(), occupied.end(), near)) continue;
+    by_keyframe[known->anchor].push_back(id);
+  }
+  std::vector<std::pair<KeyframeId, std::vector<FeatureId>>> ranked(by_keyframe.begin(),
+                                                                    by_keyframe.end());
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.second.size() > b.second.size(); });
+  int count = 0;
+  const auto enough = [&](const auto& group) {
+    const int size = static_cast<int>(group.second.size());
+    if (size < options_.fewest_together || count >= wanted) return true;
+    count += size;
+    return false;
+  };
+  ranked.erase(std::find_if(ranked.begin(), ranked.end(), enough), ranked.end());
+  return ranked;
+}
+
+}  // namespace saccade

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/map/keyframe_graph.hpp"
+#include "server/map/landmark.hpp"
+#include "shared/camera/camera_model.hpp"
+
+namespace saccade {
+
+/// A landmark out of the filter: its looks and how well it was known. Where it is, the keyframe
+/// graph knows.
+struct DormantLandmark {
+  Landmark landmark;
+  double inverse_range_sigma = 1.0;                               // from its first keyframe [1/m]
+  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  // when it left [m^2]
+  std::int64_t rests_until = 0;                                   // frame
+  int failures = 0;  // times that it was woken and not seen
+};
+
+struct DormantOptions {
+  int max_landmarks = 3000;  // then those matched least go
+  double max_view_angle_rad = 0.7;
+  double max_scale = 2.0;  // nearer or farther than at birth
+  double border_px = 20.0;
+  double apart_px = 8.0;    // from what is in view already
+  int fewest_together = 4;  // of one keyframe, to be worth a pose clone
+};
+
+/// What the filter has no room for but the map still knows: landmarks that left the filter well
+/// measured, to be woken where they come back into view (slam-spec 6, T17, T19). The tracker's
+/// thread owns it.
+class DormantLandmarks {
+ public:
+  using Lookup = std::function<std::optional<KeyframeGraph::Remembered>(FeatureId)>;
+
+  explicit DormantLandmarks(const DormantOptions& options) : options_(options) {}
+
+  void Clear() { landmarks_.clear(); }
+  std::size_t size() const { return landmarks_.size(); }
+  bool Has(FeatureId id) const { return landmarks_.contains(id); }
+  const std::map<FeatureId, DormantLandmark>& all() const { return landmarks_; }
+  void Put(DormantLandmark landmark);
+  /// Takes one out; it must be there.
+  DormantLandmark Take(FeatureId id);
+  /// Those that the graph has forgotten go.
+  void Forget(const Lookup& lookup);
+
+  /// Landmarks that should be seen from here, about `wanted` of them, by the keyframes that saw
+  /// them first; most promising keyframes first. `occupied`: pixels of what is in view already.
+  std::vector<std::pair<KeyframeId, std::vector<FeatureId>>> InView(
+      const CameraModel& camera, const Rigid3& world_from_camera, std::int64_t frame, int wanted,
+      std::span<const Eigen::Vector2d> occupied, const Lookup& lookup) const;
+
+ private:
+  DormantOptions options_;
+  std::map<FeatureId, DormantLandmark> landmarks_;
+};
+
+}  // namespace saccade
