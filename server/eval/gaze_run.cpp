@@ -69,11 +69,51 @@ GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> sourc
       "time_s,mode,pan_deg,elevation_deg,cyclotorsion_deg,believed_error_deg,true_roll_deg\n");
 }
 
+std::optional<Annotation> GazeRun::Find(const std::string& id) const {
+  for (const Annotation& each : *anchors_->Latest()) {
+    if (each.id == id) return each;
+  }
+  return std::nullopt;
+}
+
+std::optional<double> GazeRun::Way_deg(const std::string& id) const {
+  const std::optional<Annotation> target = Find(id);
+  const std::optional<Rigid3> base = loop_->controller().WorldFromMount(now_ns_);
+  if (!target || !base) return std::nullopt;
+  const MountAngles now = mount_->TrueAngles(now_ns_);
+  const MountAngles there =
+      mount_->model()
+          .Fixate(base->Inverse() * target->anchor.point_in_world, std::nullopt, now)
+          .angles;
+  return (ToVector(there) - ToVector(now)).cwiseAbs().maxCoeff() / kDegree;
+}
+
+absl::Status GazeRun::WriteClicks() const {
+  std::string text =
+      "time_s,annotation,range_m,placed_off_cm,claimed_cm,now_off_cm,"
+      "now_claimed_cm\n";
+  for (const PlacedClick& click : clicks_) {
+    const auto off = [&](const Annotation& each) {
+      return each.anchor.point_in_world - click.clicked.true_point;
+    };
+    const std::optional<Annotation> now = Find(click.clicked.id);
+    const double range = (click.clicked.true_point - click.world_from_camera.translation).norm();
+    absl::StrAppendFormat(&text, "%.2f,%s,%.2f,%.2f,%.2f,", click.time_s,
+                          click.clicked.id.substr(click.clicked.id.size() - 4), range,
+                          100 * off(click.placed).norm(), 100 * click.placed.anchor.error_m);
+    if (now) {
+      absl::StrAppendFormat(&text, "%.2f,%.2f\n", 100 * off(*now).norm(),
+                            100 * now->anchor.error_m);
+    } else {
+      text += ",\n";
+    }
+  }
+  return WriteFileAtomically(options_.folder / "clicks.csv", text);
+}
+
 void GazeRun::WriteLook(const Clicked& target, double begin_s, std::optional<double> arrival_s) {
-  const std::vector<Annotation> annotations = *anchors_->Latest();
-  const auto placed = std::find_if(annotations.begin(), annotations.end(),
-                                   [&](const Annotation& each) { return each.id == target.id; });
-  if (placed == annotations.end()) return;
+  const std::optional<Annotation> placed = Find(target.id);
+  if (!placed) return;
   const Eigen::Vector3d off = placed->anchor.point_in_world - target.true_point;
   const Eigen::Vector3d line = target.true_point - TrueCamera().translation;
   const double range = line.norm(), along = off.dot(line) / range;
@@ -183,7 +223,7 @@ absl::StatusOr<GazeRun::Clicked> GazeRun::Click(const std::optional<Eigen::Vecto
   const std::optional<Eigen::Vector3d> point = object ? object : source_->PointAt(frame, pixel);
   if (!point) return absl::NotFoundError("there is no surface");
   AnnotationDraft draft;
-  draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", ++clicks_);
+  draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", ++requests_);
   draft.author = "expert";
   draft.target = PixelTarget{frame, pixel};
   const absl::StatusOr<AnnotationEdit> edit = anchors_->Create(draft, "expert");
@@ -196,7 +236,9 @@ absl::StatusOr<GazeRun::Clicked> GazeRun::Click(const std::optional<Eigen::Vecto
   view.annotations = anchors_->Latest();
   view.down_in_world = Eigen::Vector3d::UnitY();
   loop_->OnView(view);  // without angles: no pose before its time
-  return Clicked{edit->annotation.id, *point};
+  const Clicked clicked{edit->annotation.id, *point};
+  clicks_.push_back({time_s(), clicked, edit->annotation, source_->WorldFromCamera(frame)});
+  return clicked;
 }
 
 double GazeRun::TrueError_deg(const Eigen::Vector3d& point_in_world) const {
@@ -229,7 +271,7 @@ absl::Status GazeRun::Close() {
        {recorder_.Close(), truth_file_.Close(), gaze_file_.Close(), looks_file_.Close()}) {
     if (!status.ok()) return status;
   }
-  return absl::OkStatus();
+  return WriteClicks();
 }
 
 }  // namespace saccade

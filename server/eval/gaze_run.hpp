@@ -58,6 +58,9 @@ class GazeRun {
   /// newest tracked frame. An error says why the click was refused.
   absl::StatusOr<Clicked> Click(const std::optional<Eigen::Vector3d>& object);
 
+  /// How far the joint that has the longest way must turn to look at an annotation; nothing while
+  /// the wearer's pose is not known.
+  std::optional<double> Way_deg(const std::string& id) const;
   /// A line in looks.csv: what became of a saccade to `target`, commanded at `begin_s`.
   void WriteLook(const Clicked& target, double begin_s, std::optional<double> arrival_s);
 
@@ -79,6 +82,7 @@ class GazeRun {
     int total = 0, false_depth = 0;
   };
   DepthClaims CheckDepths() const;
+  /// clicks.csv: how far off each annotation is, when it was placed and now.
   absl::Status Close();
 
  private:
@@ -86,6 +90,8 @@ class GazeRun {
           std::shared_ptr<SimMount> mount, TrackerSession session, RunRecorder recorder,
           OutputFile truth_file, OutputFile gaze_file, OutputFile looks_file);
   absl::Status TakeFrame();
+  std::optional<Annotation> Find(const std::string& id) const;
+  absl::Status WriteClicks() const;
   absl::Status Record(const Frame& frame, const FrameCost& cost);
   void Control();
 
@@ -108,7 +114,14 @@ class GazeRun {
   };
   std::deque<Due> due_;
   bool ended_ = false;
-  int clicks_ = 0;
+  struct PlacedClick {
+    double time_s;
+    Clicked clicked;
+    Annotation placed;
+    Rigid3 world_from_camera;  // true
+  };
+  std::vector<PlacedClick> clicks_;
+  int requests_ = 0;
   Trajectory truth_;
   Sample measured_, searched_px2_;
   std::optional<Eigen::Vector3d> last_joints_;

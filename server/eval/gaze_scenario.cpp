@@ -21,6 +21,7 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kStart_s = 2.2;  // on the chessboard, and the first features
 constexpr double kArrived_deg = 1.0;
 constexpr double kArrived_s = 0.2;
+constexpr double kFarWay_deg = 120.0;  // of a joint: 4 s at the default rate
 
 /// Clicks again, a frame later, until the click is taken or `until_s` has come.
 absl::StatusOr<GazeRun::Clicked> ClickUntil(GazeRun& run, double until_s,
@@ -223,7 +224,10 @@ absl::Status RunTour(GazeRun& run, const SimArguments& arguments, std::uint64_t 
       next = std::uniform_int_distribution<std::size_t>(0, clicked.size() - 1)(rng);
     }
     last = next;
-    const absl::Status looked = Look(run, clicked[next], false, 8.0, result);
+    // At 30 deg/s a whole turn takes 12 s: what is far away, or only to be had the other way round
+    // because the pan joint ends, the expert asks for fast.
+    const bool fast = run.Way_deg(clicked[next].id).value_or(0) > kFarWay_deg;
+    const absl::Status looked = Look(run, clicked[next], fast, 8.0, result);
     if (!looked.ok()) return looked;
   }
   if (absl::Status ran = run.RunUntil(arguments.duration_s); !ran.ok()) return ran;

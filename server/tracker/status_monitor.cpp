@@ -3,11 +3,12 @@
 namespace saccade {
 namespace {
 
-constexpr int kWindow = 10;         // frames
-constexpr double kGood = 0.3;       // of attempts that succeed [PT]
-constexpr double kBad = 0.13;       // [PT]
-constexpr int kConfirmations = 3;   // frames after a relocalisation
-constexpr double kConfirmed = 0.6;  // of attempts there (slam-spec 6)
+constexpr int kWindow = 10;             // frames
+constexpr double kGood = 0.3;           // of attempts that succeed [PT]
+constexpr double kBad = 0.13;           // [PT]
+constexpr int kConfirmations = 3;       // frames after a relocalisation
+constexpr double kConfirmed = 0.6;      // of attempts there (slam-spec 6)
+constexpr int kLongestSuspension = 60;  // frames
 
 }  // namespace
 
@@ -44,13 +45,27 @@ void StatusMonitor::Confirm(int attempted, int accepted) {
   }
 }
 
+void StatusMonitor::Suspend() {
+  refused_ = false;
+  if (++suspended_in_row_ > kLongestSuspension) {
+    if (status_ != TrackingStatus::kLost) Count(0, 0, true);
+  } else if (status_ == TrackingStatus::kTracking) {
+    status_ = TrackingStatus::kCoasting;
+  }
+}
+
 void StatusMonitor::Record(int attempted, int accepted, bool settled) {
+  suspended_in_row_ = 0;
   refused_ = false;
   if (status_ == TrackingStatus::kLost) return;
   if (status_ == TrackingStatus::kRelocalising) {
     Confirm(attempted, accepted);
     return;
   }
+  Count(attempted, accepted, settled);
+}
+
+void StatusMonitor::Count(int attempted, int accepted, bool settled) {
   window_.push_back({attempted, accepted});
   if (window_.size() > kWindow) window_.pop_front();
   const double share = ratio();
@@ -84,6 +99,7 @@ std::string AdviceFor(const StatusMonitor& monitor, bool waits_for_target, doubl
     case TrackingStatus::kRelocalising:
       return "Place recognised: hold still for a moment.";
     case TrackingStatus::kCoasting:
+      if (monitor.suspended()) return "";
       return "The view is covered, blurred or empty: uncover the lens or look at something with "
              "texture.";
     case TrackingStatus::kTracking:

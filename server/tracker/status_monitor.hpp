@@ -20,11 +20,16 @@ class StatusMonitor {
   /// The outcome of one frame that was searched. `settled`: the map's depths are known well enough
   /// to publish poses; until then the status is initialising.
   void Record(int attempted, int accepted, bool settled);
+  /// A frame that was not searched, because the head turns too fast for it to show anything: its
+  /// encoders carry the pose. It counts neither for nor against; after 2 s of these, as blind.
+  void Suspend();
   /// Tracking was lost, and now the camera may be found again: three frames must confirm it.
   void BeginRelocalisation();
 
   TrackingStatus status() const { return status_; }
   TrackingQuality quality() const { return quality_; }
+  /// True if the newest frame was not searched.
+  bool suspended() const { return suspended_in_row_ > 0; }
   /// True if a relocalisation was refused by the frames after it.
   bool refused() const { return refused_; }
   /// Part of attempted searches that succeeded over the last 10 frames; 1 if none was attempted.
@@ -32,6 +37,7 @@ class StatusMonitor {
 
  private:
   void Confirm(int attempted, int accepted);
+  void Count(int attempted, int accepted, bool settled);
 
   TrackerOptions options_;
   TrackingStatus status_ = TrackingStatus::kInitialising;
@@ -42,6 +48,7 @@ class StatusMonitor {
   std::deque<Counts> window_;
   int bad_in_row_ = 0;
   int blind_in_row_ = 0;
+  int suspended_in_row_ = 0;
   int confirming_ = 0;  // frames left
   int confirmed_ = 0;
   bool refused_ = false;

@@ -147,8 +147,14 @@ void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
   // Once: in a row of blind frames every widening would make the next search more hopeless.
   const bool followed = matches_.accepted >= options_.coasting_below;
   filter_.Predict(dt, noise, head ? &*head : nullptr);
-  Wake(camera);
+  suspended_ = head && LogQuaternion(head->camera_from_next.rotation).norm() >
+                           options_.suspend_rate_rad_s * dt;
+  if (!suspended_) Wake(camera);
   times_.predict_ms = watch.Lap_ms();
+  if (suspended_) {
+    matches_ = FrameMatches();
+    return;
+  }
   matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
   if (matches_.surprised && followed) {
     filter_.Inflate(LineariseMotion(before, before.world_from_camera.rotation, dt, wild).q);
@@ -184,6 +190,10 @@ void Tracker::Impl::Correct(const CameraModel& camera) {
 void Tracker::Impl::Follow(const Frame& frame, double dt) {
   ++frames_;
   PredictAndSearch(*frame.camera, dt);
+  if (suspended_) {
+    monitor_.Suspend();
+    return;
+  }
   Correct(*frame.camera);
   StopWatch watch;
   monitor_.Record(matches_.attempted, matches_.accepted, Settled());

@@ -77,6 +77,7 @@ class Tracker::Impl {
   bool has_frame_ = false;
   bool started_ = false;
   bool metric_ = false;
+  bool suspended_ = false;  // the head turns too fast for this frame to be searched
   MapKeeper::DepthGuess depth_;
   std::int64_t frames_ = 0;  // since the start of this map
   std::int64_t frames_lost_ = 0;

@@ -27,6 +27,7 @@ const Key kKeys[] = {
     {"acceleration_sigma_m_s2", &O::acceleration_sigma_m_s2, 1e-3, 1e3},
     {"angular_acceleration_sigma_rad_s2", &O::angular_acceleration_sigma_rad_s2, 1e-3, 1e3},
     {"encoders", &O::encoders, 0, 1},
+    {"suspend_rate_rad_s", &O::suspend_rate_rad_s, 0.1, 1e3},
     {"worn_acceleration_sigma_m_s2", &O::worn_acceleration_sigma_m_s2, 1e-3, 1e3},
     {"worn_angular_acceleration_sigma_rad_s2", &O::worn_angular_acceleration_sigma_rad_s2, 1e-3,
      1e3},

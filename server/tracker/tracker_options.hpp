@@ -22,6 +22,8 @@ struct TrackerOptions {
   double angular_acceleration_sigma_rad_s2 = 6.0;
   // The same where encoders tell what the head does: only the wearer is left to be guessed.
   bool encoders = true;  // use them
+  /// While the joints turn faster, pictures are too blurred to search: encoders carry the pose.
+  double suspend_rate_rad_s = 2.0;
   double worn_acceleration_sigma_m_s2 = 2.0;
   double worn_angular_acceleration_sigma_rad_s2 = 2.0;  // a walking trunk
 
