@@ -90,7 +90,7 @@ std::optional<double> GazeRun::Way_deg(const std::string& id) const {
 
 absl::Status GazeRun::WriteClicks() const {
   std::string text =
-      "time_s,annotation,range_m,placed_off_cm,claimed_cm,now_off_cm,"
+      "time_s,annotation,object,range_m,placed_off_cm,claimed_cm,now_off_cm,"
       "now_claimed_cm\n";
   for (const PlacedClick& click : clicks_) {
     const auto off = [&](const Annotation& each) {
@@ -98,8 +98,12 @@ absl::Status GazeRun::WriteClicks() const {
     };
     const std::optional<Annotation> now = Find(click.clicked.id);
     const double range = (click.clicked.true_point - click.world_from_camera.translation).norm();
-    absl::StrAppendFormat(&text, "%.2f,%s,%.2f,%.2f,%.2f,", click.time_s,
-                          click.clicked.id.substr(click.clicked.id.size() - 4), range,
+    std::string object;  // as the room calls it
+    for (const NamedPoint& each : source_->objects()) {
+      if (each.point_in_world == click.clicked.true_point) object = each.name;
+    }
+    absl::StrAppendFormat(&text, "%.2f,%s,%s,%.2f,%.2f,%.2f,", click.time_s,
+                          click.clicked.id.substr(click.clicked.id.size() - 4), object, range,
                           100 * off(click.placed).norm(), 100 * click.placed.anchor.error_m);
     if (now) {
       absl::StrAppendFormat(&text, "%.2f,%.2f\n", 100 * off(*now).norm(),

@@ -153,6 +153,22 @@ absl::Status RunHorizon(GazeRun& run, const SimArguments& arguments, GazeResult&
                       [&] { result.squared_roll_deg.Add(std::pow(run.TrueRoll_deg(), 2)); });
 }
 
+/// Whether a click at the end of `line` hits the same thing a few pixels beside it. On an outline
+/// nobody can tell whether what is in front or what is behind is meant.
+bool IsOnItsThing(GazeRun& run, const Eigen::Vector3d& eye, const Eigen::Vector3d& line) {
+  constexpr double kBeside_rad = 0.012;  // 6 px
+  constexpr double kSameSurface = 0.05;  // of the distance
+  const Eigen::Vector3d ray = line.normalized();
+  const Eigen::Vector3d across = ray.cross(Eigen::Vector3d::UnitY()).normalized();
+  for (int k = 0; k < 8; ++k) {
+    const Eigen::AngleAxisd round(k * std::numbers::pi / 4.0, ray);
+    const Eigen::Vector3d beside = (ray + kBeside_rad * (round * across)).normalized();
+    const std::optional<double> surface = run.source().SurfaceAlong(eye, beside);
+    if (!surface || std::abs(*surface - line.norm()) > kSameSurface * line.norm()) return false;
+  }
+  return true;
+}
+
 /// Twelve named objects, round the wearer, that can be seen from where he starts.
 std::vector<Eigen::Vector3d> TourObjects(GazeRun& run) {
   const Rigid3 base = run.source().wearer().WorldFromShoulder(0);
@@ -162,6 +178,7 @@ std::vector<Eigen::Vector3d> TourObjects(GazeRun& run) {
     const std::optional<double> surface =
         run.source().SurfaceAlong(base.translation, line.normalized());
     if (surface && *surface < line.norm() - 0.02) continue;
+    if (!IsOnItsThing(run, base.translation, line)) continue;
     const Eigen::Vector3d in_base = base.Inverse() * object.point_in_world;
     if (std::abs(std::atan2(in_base.y(), in_base.head<1>().norm() + std::abs(in_base.z()))) >
         50 * kDegree) {
