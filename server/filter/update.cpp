@@ -243,11 +243,16 @@ void FilterState::JudgeNoise(const UpdateReport& report) {
 
 VectorXd FilterState::KeptShares(const std::vector<Turned>& turned) const {
   constexpr double kDoubling = 10.0;  // updates
+  // However good matches are: a patch seen from elsewhere is off by 0.3 px and more, and always the
+  // same way. A young map needs every hint of depth.
+  constexpr double kBias = 0.5;  // of R
+  constexpr int kYoung = 150;    // updates
+  const double noise_scale = std::max(noise_scale_, updates_ > kYoung ? kBias : 0.0);
   std::vector<double> kept;
   for (const Turned& each : turned) {
     // The errors at birth are the same in every frame: what is unlikely once is not for long.
     const double sigmas = options_.parallax_sigmas + std::log2(1.0 + each.age / kDoubling);
-    const double share = each.misfit.Evidence(sigmas, noise_scale_);
+    const double share = each.misfit.Evidence(sigmas, noise_scale);
     kept.insert(kept.end(), each.ranges.size(), 1.0 - share);
   }
   return Eigen::Map<VectorXd>(kept.data(), std::ssize(kept));
