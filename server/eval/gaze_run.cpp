@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kFalseDepth = 0.3;  // relative
+constexpr double kOnePixel_rad = 0.002;
 
 Timestamp Ns(double seconds) { return static_cast<Timestamp>(std::llround(1e9 * seconds)); }
 
@@ -255,6 +256,21 @@ double GazeRun::TrueRoll_deg() const {
   return std::atan2(-down.x(), down.y()) / kDegree;
 }
 
+bool GazeRun::IsOnASurface(const Eigen::Vector3d& eye, const Eigen::Vector3d& point) const {
+  const double believed = (point - eye).norm();
+  const Eigen::Vector3d ray = (point - eye) / believed;
+  const Eigen::Vector3d across = ray.unitOrthogonal();
+  // And a pixel round it: a corner of an outline is where one surface ends before another.
+  for (int k = -1; k < 8; ++k) {
+    const Eigen::AngleAxisd round(std::max(k, 0) * std::numbers::pi / 4.0, ray);
+    const double beside = k < 0 ? 0.0 : kOnePixel_rad;
+    const std::optional<double> real =
+        source_->SurfaceAlong(eye, (ray + beside * (round * across)).normalized());
+    if (real && std::abs(believed / *real - 1) <= kFalseDepth) return true;
+  }
+  return false;
+}
+
 GazeRun::DepthClaims GazeRun::CheckDepths() const {
   DepthClaims claims;
   if (newest_ == nullptr) return claims;
@@ -262,10 +278,7 @@ GazeRun::DepthClaims GazeRun::CheckDepths() const {
   for (const FeatureSnapshot& feature : newest_->features) {
     ++claims.total;
     if (!feature.depth_known) continue;
-    const Eigen::Vector3d line = feature.point_in_world - eye;
-    const double believed = line.norm();
-    const std::optional<double> real = source_->SurfaceAlong(eye, line / believed);
-    if (!real || std::abs(believed / *real - 1) > kFalseDepth) ++claims.false_depth;
+    if (!IsOnASurface(eye, feature.point_in_world)) ++claims.false_depth;
   }
   return claims;
 }

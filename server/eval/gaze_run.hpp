@@ -92,6 +92,7 @@ class GazeRun {
   absl::Status TakeFrame();
   std::optional<Annotation> Find(const std::string& id) const;
   absl::Status WriteClicks() const;
+  bool IsOnASurface(const Eigen::Vector3d& eye, const Eigen::Vector3d& point) const;
   absl::Status Record(const Frame& frame, const FrameCost& cost);
   void Control();
 

@@ -213,6 +213,15 @@ bool FilterState::CountErrorsFrom(AnchorPoseId anchor) {
   return true;
 }
 
+double FilterState::DirectionSigma(AnchorPoseId anchor) const {
+  const auto at = std::find_if(anchors_.begin(), anchors_.end(),
+                               [&](const Anchor& each) { return each.id == anchor; });
+  if (at == anchors_.end()) return 0.0;
+  double variance = 0.0;
+  for (int k = 3; k < kPoseDim; ++k) variance += covariance_.at(at->offset + k, at->offset + k);
+  return std::sqrt(std::max(0.0, variance / 3.0));
+}
+
 void FilterState::Remove(std::span<const FeatureId> ids) {
   std::vector<std::pair<int, int>> gone;
   for (const FeatureId id : ids) {

@@ -183,6 +183,9 @@ class FilterState {
   /// are at first estimates, which learn nothing of where the world is. O(n^2).
   bool CountErrorsFrom(AnchorPoseId anchor);
 
+  /// How surely a clone's direction is known from where errors are counted [rad]; unknown: 0.
+  double DirectionSigma(AnchorPoseId anchor) const;
+
   /// Removes features whose inverse range is negative by two sigma; returns them.
   std::vector<FeatureId> RemoveBehind();
 

@@ -7,11 +7,12 @@
 namespace saccade {
 namespace {
 
-constexpr int kSettledFeatures = 12;    // with known depth, before poses are published
-constexpr int kLongestSettling = 15;    // frames: under pure rotation depth never settles
-constexpr double kSettledDepth = 0.25;  // sigma / inverse range
-constexpr int kFewestToUpdate = 3;      // matches: fewer can agree by chance
-constexpr double kSurprise = 3.0;       // times the motion noise, after an unexpected move
+constexpr int kSettledFeatures = 12;     // with known depth, before poses are published
+constexpr int kLongestSettling = 15;     // frames: under pure rotation depth never settles
+constexpr double kSettledDepth = 0.25;   // sigma / inverse range
+constexpr int kFewestToUpdate = 3;       // matches: fewer can agree by chance
+constexpr double kLooseTie_rad = 0.005;  // of what is in view to the clone that errors count from
+constexpr double kSurprise = 3.0;        // times the motion noise, after an unexpected move
 
 /// The camera's own word on its shutter, else the filter finds out.
 FilterOptions MakeFilterOptions(const TrackerOptions& options, const CameraModel& camera) {
@@ -236,11 +237,13 @@ void Tracker::Impl::MoveHome() {
   if (seen_from.empty()) return;
   const auto from_home = std::count_if(seen_from.begin(), seen_from.end(),
                                        [&](AnchorPoseId id) { return id <= home_; });
-  if (from_home >= options_.home_share * static_cast<double>(seen_from.size())) return;
   const auto middle = seen_from.begin() + std::ssize(seen_from) / 2;
   std::nth_element(seen_from.begin(), middle, seen_from.end());
-  if (*middle <= home_) return;  // back at places older than home
-  if (filter_.CountErrorsFrom(*middle)) home_ = *middle;
+  const bool far =
+      from_home < options_.home_share * static_cast<double>(seen_from.size()) && *middle > home_;
+  // Back at places older than home, or woken ones: what counts is how surely they are tied to it.
+  const bool loose = filter_.DirectionSigma(*middle) > kLooseTie_rad;
+  if ((far || loose) && filter_.CountErrorsFrom(*middle)) home_ = *middle;
 }
 
 void Tracker::Impl::Manage(const Frame& frame) {
