@@ -163,7 +163,7 @@ TEST(FilterState, CountingErrorsFromACloneKeepsWhatIsSeenFromElsewhere) {
   ASSERT_GT(before.size(), 10u);
   const Rigid3 pose = run.filter_.camera().world_from_camera;
   EXPECT_FALSE(run.filter_.CountErrorsFrom(clone + 1));
-  EXPECT_GT(run.filter_.DirectionSigma(clone), 0.1);
+  EXPECT_GT(run.filter_.DirectionSigma(clone), 0.003);
   ASSERT_TRUE(run.filter_.CountErrorsFrom(clone));
   EXPECT_LT(run.filter_.DirectionSigma(clone), 1e-6);
   for (const auto& [id, covariance] : before) {
