@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <span>
+
+#include "server/tracker/group_consistency.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kBorder_px = 6.0;   // half a patch: nearer to the edge nothing can be compared
-constexpr double kWidest_px = 30.0;  // sigma of the widest ellipse that is searched
+constexpr double kBorder_px = 6.0;       // half a patch: nearer to the edge nothing can be compared
+constexpr double kWidest_px = 30.0;      // sigma of the widest ellipse that is searched
+constexpr double kUncertain_rad = 0.03;  // of the camera's direction, before a frame is searched
 
 SearchOptions MakeSearchOptions(const TrackerOptions& options) {
   SearchOptions search;
@@ -53,6 +57,38 @@ void HeedTarget(std::span<LandmarkMatch* const> found) {
   if (total < kFewest || 2 * refused <= total) return;
   for (LandmarkMatch* match : found) {
     if (known(match)) match->weight = std::max(match->weight, kSay);
+  }
+}
+
+/// Where a blind camera looks again, gates are wide: matches that contradict the others of their
+/// clone are dropped. Only of features whose depth is known; the others' residuals tell nothing.
+void HeedGroups(const CameraModel& camera, const FilterState& filter, const LandmarkMap& map,
+                const Matrix6d& prior, FrameMatches& matches) {
+  constexpr std::uint32_t kMature = 15;  // matches
+  constexpr double kDepthKnown = 0.05;   // sigma / inverse range
+  constexpr std::size_t kFewest = 12;
+  std::map<AnchorPoseId, int> group_of;
+  std::vector<GroupResidual> residuals;
+  std::vector<LandmarkMatch*> judged;
+  for (LandmarkMatch& match : matches.in_view) {
+    if (!match.accepted() || !filter.Has(match.id) || map.Find(match.id)->matched < kMature) {
+      continue;
+    }
+    const FeatureMarginal marginal = filter.Marginal(match.id);
+    if (marginal.inverse_range_sigma > kDepthKnown * marginal.inverse_range) continue;
+    const auto at = PredictAnchored(camera, matches.pose.world_from_camera, filter.Point(match.id));
+    if (!at) continue;
+    const int next = static_cast<int>(group_of.size());
+    const int group = group_of.emplace(filter.AnchorOf(match.id), next).first->second;
+    residuals.push_back({group, match.pixel - match.row_shift - at->pixel, at->d_camera,
+                         at->d_anchor.rightCols<3>()});
+    judged.push_back(&match);
+  }
+  if (judged.size() < kFewest) return;
+  const std::vector<bool> agrees =
+      AgreeTogether(residuals, prior.diagonal().cwiseMax(0.0).cwiseSqrt());
+  for (std::size_t k = 0; k < judged.size(); ++k) {
+    if (!agrees[k]) judged[k]->weight = 0.0;
   }
 }
 
@@ -256,6 +292,9 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
     Search(pyramid, camera, map, prior, pose, spread, motion, filter.readout_s(), match);
   }
   matches.pose = Solve(camera, prior, in_view, random);
+  if (prior.covariance.diagonal().tail<3>().maxCoeff() > kUncertain_rad * kUncertain_rad) {
+    HeedGroups(camera, filter, map, prior.covariance, matches);
+  }
   for (const LandmarkMatch& match : in_view) {
     matches.attempted += match.searched ? 1 : 0;
     matches.accepted += match.accepted() ? 1 : 0;
