@@ -77,6 +77,23 @@ TEST(WearerPredictor, FollowsAHalfHertzSwayAheadOfTime) {
   EXPECT_LT(worst, 0.004);  // 0.2 deg, where a constant velocity is off by 0.6
 }
 
+// A fast saccade: a third of a second without poses, then a few, each wrong by 0.1 deg.
+TEST(WearerPredictor, AfterAShortGapTheRateIsStillKnown) {
+  WearerPredictor predictor(0.25);
+  const auto angle_at = [](double t) { return 0.15 * t; };  // 9 deg/s
+  double worst = 0;
+  for (int k = 0; k < 60; ++k) {
+    if (k >= 40 && k < 50) continue;
+    const double t = k / 30.0, noise = k % 2 == 0 ? 0.0017 : -0.0017;
+    predictor.Add(std::llround(1e9 * t), {ExpQuaternion({0, angle_at(t) + noise, 0}), {0, 0, 0}});
+    if (k < 50 || k > 56) continue;
+    const auto ahead = predictor.At(std::llround(1e9 * (t + 0.1)));
+    const Rigid3 truth{ExpQuaternion({0, angle_at(t + 0.1), 0}), {0, 0, 0}};
+    worst = std::max(worst, RotationAngle(*ahead, truth));
+  }
+  EXPECT_LT(worst, 0.007);  // 0.4 deg; from the poses since the gap alone 1.0
+}
+
 TEST(WearerPredictor, AfterAGapItStartsAnew) {
   WearerPredictor predictor(0.25);
   for (int k = 0; k < 10; ++k) predictor.Add(k * 33'333'333LL, {{1, 0, 0, 0}, {0.1 * k, 0, 0}});
