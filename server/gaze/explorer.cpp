@@ -6,6 +6,7 @@
 namespace saccade {
 namespace {
 
+constexpr std::size_t kMostCandidates = 300;
 constexpr double kSurroundings_m = 0.3;
 constexpr std::size_t kRemembered = 6;
 constexpr double kNearest_m = 0.2;
@@ -24,7 +25,10 @@ std::optional<Eigen::Vector3d> Explorer::Choose(const MapSnapshot& map,
   const Rigid3 mount_from_world = world_from_mount.Inverse();
   std::optional<Eigen::Vector3d> best;
   double best_score = -1;
-  for (const FeatureSnapshot& feature : map.features) {
+  // Of a large map every so many-th: each is compared with all others.
+  const std::size_t stride = 1 + map.features.size() / kMostCandidates;
+  for (std::size_t k = 0; k < map.features.size(); k += stride) {
+    const FeatureSnapshot& feature = map.features[k];
     const Eigen::Vector3d point = feature.point_in_world;
     if (!point.allFinite() || (mount_from_world * point).norm() < kNearest_m) continue;
     double score = 0;
