@@ -10,7 +10,11 @@ namespace saccade {
 namespace {
 
 std::size_t Bytes(const cv::Mat& image) { return image.total() * image.elemSize(); }
-std::size_t Bytes(const Frame& frame) { return Bytes(frame.grey) + Bytes(frame.color); }
+// A map of a whole room is a third of a picture.
+std::size_t Bytes(const PastFrame& past) {
+  const std::size_t features = past.snapshot ? past.snapshot->features.size() : 0;
+  return Bytes(past.frame->grey) + Bytes(past.frame->color) + features * sizeof(FeatureSnapshot);
+}
 
 }  // namespace
 
@@ -22,14 +26,14 @@ void FrameRing::Push(PastFrame past) {
     bytes_ = 0;
     colored_from_ = 0;
   }
-  bytes_ += Bytes(*past.frame);
+  bytes_ += Bytes(past);
   frames_.push_back(std::move(past));
   Trim();
 }
 
 void FrameRing::Trim() {
   const auto pop = [this] {
-    bytes_ -= Bytes(*frames_.front().frame);
+    bytes_ -= Bytes(frames_.front());
     frames_.pop_front();
     if (colored_from_ > 0) --colored_from_;
   };
