@@ -24,7 +24,8 @@ enum class TrackingQuality { kUnknown, kBad, kPoor, kGood };
 /// What became of a feature in this frame: its colour (D03): red, blue, yellow.
 enum class FeatureState { kNotAttempted, kMeasured, kFailed };
 
-/// One landmark as the filter has it after this frame.
+/// One landmark as the filter has it after this frame, or as the map remembers it (at rest: out of
+/// the filter until it comes back into view; then not attempted).
 struct FeatureSnapshot {
   FeatureId id = 0;
   FeatureState state = FeatureState::kNotAttempted;
