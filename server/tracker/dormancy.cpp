@@ -37,6 +37,7 @@ void Tracker::Impl::Rest(std::span<const FeatureId> ids) {
   }
   filter_.Remove(ids);
   map_.Remove(ids);
+  dormant_.Forget([this](FeatureId id) { return refiner_.Remember(id); });
 }
 
 Matrix6d Tracker::Impl::WakeCovariance(double distance_m) const {
@@ -95,7 +96,8 @@ std::optional<Eigen::Vector3d> Tracker::Impl::PointNow(FeatureId id) const {
   if (landmark != nullptr && filter_.Has(id)) return filter_.Marginal(id).point_in_world;
   if (!dormant_.Has(id)) return std::nullopt;
   const auto known = refiner_.Remember(id);
-  return known ? std::optional(known->PointInWorld()) : std::nullopt;
+  if (!known || !(known->estimate.inverse_range > 0.0)) return std::nullopt;
+  return known->PointInWorld();
 }
 
 void Tracker::Impl::PublishDormant(MapSnapshot& snapshot) const {
@@ -103,7 +105,8 @@ void Tracker::Impl::PublishDormant(MapSnapshot& snapshot) const {
   const Eigen::Matrix3d turn = camera_from_world.RotationMatrix();
   for (const auto& [id, dormant] : dormant_.all()) {
     const auto known = refiner_.Remember(id);
-    if (!known) continue;
+    // Adjustment may have put it behind infinity: then it is nowhere.
+    if (!known || !(known->estimate.inverse_range > 0.0)) continue;
     FeatureSnapshot& feature = snapshot.features.emplace_back();
     feature.id = id;
     feature.matched_count = dormant.landmark.matched;
