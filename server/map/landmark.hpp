@@ -28,6 +28,7 @@ struct Landmark {
   std::uint32_t matched = 0;        // of these, accepted by the filter
   std::uint32_t failed_in_row = 0;  // newest attempts without success
   std::int64_t last_matched_frame = -1;
+  std::int64_t last_in_view_frame = -1;  // hidden or not
   double recent = 1.0;  // smoothed share of attempts that succeeded, about the last 20
   /// Since it was last woken (DormantLandmarks); nothing: it never slept.
   struct Probation {

@@ -12,22 +12,33 @@ constexpr std::int64_t kPause = 150;        // frames that one rests which was w
 constexpr int kMostFailures = 3;
 constexpr int kMostAtOnce = 30;
 
+/// How often it was woken in vain.
+int Failures(const Landmark& landmark) {
+  if (!landmark.woken) return 0;
+  return landmark.woken->failures + (MapKeeper::FailsProbation(landmark) ? 1 : 0);
+}
+
 }  // namespace
+
+bool Tracker::Impl::MayRest(const Landmark& landmark) const {
+  if (!options_.wake || landmark.known || landmark.matched < kMature ||
+      Failures(landmark) >= kMostFailures || !filter_.Has(landmark.id) ||
+      !refiner_.Remember(landmark.id)) {
+    return false;
+  }
+  const FeatureMarginal marginal = filter_.Marginal(landmark.id);
+  return marginal.inverse_range_sigma <= kDepthKnown * marginal.inverse_range;
+}
 
 void Tracker::Impl::Rest(std::span<const FeatureId> ids) {
   for (const FeatureId id : ids) {
     const Landmark* landmark = map_.Find(id);
-    if (!options_.wake || landmark == nullptr || landmark->known || !filter_.Has(id)) continue;
+    if (landmark == nullptr || !MayRest(*landmark)) continue;
     const FeatureMarginal marginal = filter_.Marginal(id);
     const bool failed = MapKeeper::FailsProbation(*landmark);
-    const int failures = landmark->woken ? landmark->woken->failures + (failed ? 1 : 0) : 0;
-    if (landmark->matched < kMature || failures >= kMostFailures || !refiner_.Remember(id) ||
-        marginal.inverse_range_sigma > kDepthKnown * marginal.inverse_range) {
-      continue;
-    }
     DormantLandmark dormant;
     dormant.landmark = *landmark;
-    dormant.failures = failures;
+    dormant.failures = Failures(*landmark);
     dormant.inverse_range_sigma = marginal.inverse_range_sigma;
     dormant.covariance_in_world = marginal.covariance_in_world;
     dormant.rests_until = failed ? frames_ + kPause : 0;
@@ -79,7 +90,7 @@ void Tracker::Impl::WakeOne(FeatureId id, AnchorPoseId clone,
   Landmark& landmark = dormant.landmark;
   landmark.woken = Landmark::Probation{.failures = dormant.failures};
   landmark.failed_in_row = 0;
-  landmark.last_matched_frame = frames_;
+  landmark.last_matched_frame = landmark.last_in_view_frame = frames_;
   map_.Add(std::move(landmark));
 }
 

@@ -1,5 +1,7 @@
 #include "server/tracker/encoder_motion.hpp"
 
+#include <algorithm>
+
 namespace saccade {
 namespace {
 
@@ -33,6 +35,11 @@ HeadMotion EncoderMotion(const MountModel& model, const MountAngles& before,
     head.camera_from_next.translation.setZero();
   }
   return head;
+}
+
+double RateWhenExposed(double mean_rad_s, double mean_before_rad_s) {
+  const double speeding_up = std::max(0.0, mean_rad_s - mean_before_rad_s);
+  return mean_rad_s + speeding_up;
 }
 
 }  // namespace saccade

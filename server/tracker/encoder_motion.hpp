@@ -14,4 +14,9 @@ namespace saccade {
 HeadMotion EncoderMotion(const MountModel& model, const MountAngles& before,
                          const MountAngles& after, double dt, bool metric);
 
+/// How fast the camera may turn in an exposure [rad/s], from its mean rates over the time since the
+/// frame before and over the time before that: a saccade that begins is faster by now than on the
+/// average.
+double RateWhenExposed(double mean_rad_s, double mean_before_rad_s);
+
 }  // namespace saccade

@@ -48,8 +48,8 @@ std::optional<MapKeeper::DepthGuess> MapKeeper::GuessDepth(const FilterState& fi
   return DepthGuess{median, 0.5 * median};
 }
 
-void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map,
-                       const Rest& rest) {
+void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest,
+                       const MayRest& may_rest) {
   std::vector<FeatureId> gone = filter.RemoveBehind();
   std::vector<FeatureId> resting;
   const std::vector<FeatureId> unreliable = Unreliable(map, RetirementOptions());
@@ -60,9 +60,11 @@ void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map
   map.Remove(gone);
   for (const Landmark& landmark : map.all()) {
     if (landmark.known) continue;
-    const bool unseen = options_.rest_after > 0 && landmark.matched > 0 &&
-                        landmark.last_matched_frame < frame - options_.rest_after;
-    if (unseen || FailsProbation(landmark)) resting.push_back(landmark.id);
+    const bool out_of_sight =
+        options_.rest_after > 0 && landmark.last_in_view_frame < frame - options_.rest_after;
+    if (FailsProbation(landmark) || (out_of_sight && may_rest(landmark))) {
+      resting.push_back(landmark.id);
+    }
   }
   std::sort(resting.begin(), resting.end());
   resting.erase(std::unique(resting.begin(), resting.end()), resting.end());

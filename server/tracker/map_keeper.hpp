@@ -32,9 +32,12 @@ class MapKeeper {
 
   /// Takes features out of filter and map that may be of use later.
   using Rest = std::function<void(std::span<const FeatureId>)>;
-  /// Removes what is unreliable or impossible; what is out of sight, was woken in vain or, in a
-  /// full map, is worth least goes to `rest`.
-  void Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest);
+  /// Whether a feature would be of use later.
+  using MayRest = std::function<bool(const Landmark&)>;
+  /// Removes what is unreliable or impossible. To `rest` goes what is out of sight and `may_rest`,
+  /// what was woken in vain and, in a full map, what is worth least.
+  void Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest,
+              const MayRest& may_rest);
   /// A woken landmark that is hardly ever found where it was thought to be.
   static bool FailsProbation(const Landmark& landmark);
   /// How many more features the map wants in view.

@@ -62,6 +62,7 @@ void Tracker::Impl::Reset() {
   matches_ = FrameMatches();
   before_relocalisation_.reset();
   started_ = metric_ = has_frame_ = false;
+  head_rate_rad_s_ = 0.0;
   frames_ = frames_lost_ = 0;
   home_ = 1;
   ++generation_;
@@ -148,8 +149,9 @@ void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
   // Once: in a row of blind frames every widening would make the next search more hopeless.
   const bool followed = matches_.accepted >= options_.coasting_below;
   filter_.Predict(dt, noise, head ? &*head : nullptr);
-  suspended_ = head && LogQuaternion(head->camera_from_next.rotation).norm() >
-                           options_.suspend_rate_rad_s * dt;
+  const double rate = head ? LogQuaternion(head->camera_from_next.rotation).norm() / dt : 0.0;
+  suspended_ = RateWhenExposed(rate, head_rate_rad_s_) > options_.suspend_rate_rad_s;
+  head_rate_rad_s_ = rate;
   if (!suspended_) Wake(camera);
   times_.predict_ms = watch.Lap_ms();
   if (suspended_) {
@@ -250,8 +252,10 @@ void Tracker::Impl::Manage(const Frame& frame) {
   // A frame in which hardly anything was found says nothing about single features.
   const bool telling = matches_.accepted >= 0.3 * matches_.attempted;
   for (const LandmarkMatch& match : matches_.in_view) {
+    Landmark& landmark = *map_.Find(match.id);
+    landmark.last_in_view_frame = frames_;
     if (!match.searched || (!telling && !match.accepted())) continue;
-    map_.Find(match.id)->Record(match.accepted(), frames_);
+    landmark.Record(match.accepted(), frames_);
   }
   if (starter_.TargetExpired(frames_) && matches_.accepted > 0) {
     KeepTargetPoints(frame);
@@ -264,7 +268,9 @@ void Tracker::Impl::Manage(const Frame& frame) {
       return std::holds_alternative<Eigen::Vector3d>(match.point);
     });
   }
-  keeper_.Retire(frames_, filter_, map_, [this](std::span<const FeatureId> ids) { Rest(ids); });
+  keeper_.Retire(
+      frames_, filter_, map_, [this](std::span<const FeatureId> ids) { Rest(ids); },
+      [this](const Landmark& landmark) { return MayRest(landmark); });
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;

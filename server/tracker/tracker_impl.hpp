@@ -40,7 +40,9 @@ class Tracker::Impl {
   /// Errors are counted from where the camera is, not from where it once began (server/filter,
   /// gauge).
   void MoveHome();
-  /// Takes features out of the filter; those that are well known are only put to rest.
+  /// Whether a feature is known well enough to be woken one day.
+  bool MayRest(const Landmark& landmark) const;
+  /// Takes features out of the filter; those that may rest are only put to rest.
   void Rest(std::span<const FeatureId> ids);
   /// Takes landmarks at rest back that should be in view, where the filter has too few.
   void Wake(const CameraModel& camera);
@@ -77,7 +79,8 @@ class Tracker::Impl {
   bool has_frame_ = false;
   bool started_ = false;
   bool metric_ = false;
-  bool suspended_ = false;  // the head turns too fast for this frame to be searched
+  double head_rate_rad_s_ = 0.0;  // mean, up to the newest frame; 0 without encoders
+  bool suspended_ = false;        // the head turns too fast for this frame to be searched
   MapKeeper::DepthGuess depth_;
   std::int64_t frames_ = 0;  // since the start of this map
   std::int64_t frames_lost_ = 0;

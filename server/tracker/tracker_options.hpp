@@ -55,8 +55,8 @@ struct TrackerOptions {
   // Map.
   int features_in_view = 80;  // new ones are started below
   int max_features = 250;     // in the filter; update time grows with the square
-  int rest_after = 0;  // frames out of sight, then a feature leaves the filter; 0: when it is full
-  bool wake = true;    // what left well measured is taken back where it comes into view again
+  int rest_after = 30;  // frames out of sight, then what may rest does; 0: when the filter is full
+  bool wake = true;     // what left well measured is taken back where it comes into view again
   double wake_position_share = 0.01;   // sigma of where it was seen from, of the distance...
   double wake_angle_sigma_rad = 0.01;  // ...and of that camera's direction
   int births_per_clone = 15;           // features that share one pose clone (slam-spec 5.4)

@@ -1,7 +1,8 @@
-// Landmarks that the filter has no room for, and that come back into view.
+// Landmarks that leave the filter, full or out of sight, and come back into view.
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <map>
 
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
@@ -68,6 +69,64 @@ TEST(Dormancy, WhatLeftAFullFilterIsMeasuredAgain) {
   EXPECT_GT(woken.old_ones_measured, 2 * forgotten.old_ones_measured);
   EXPECT_GT(woken.features, forgotten.features) << "what is at rest is part of the map";
   EXPECT_LT(woken.error_rad, 0.01);
+}
+
+/// Follows how many of the landmarks that were seen first stay where they are, to the bit, from
+/// frame to frame.
+struct Watched {
+  explicit Watched(const SourceInfo& source, int rest_after) {
+    TrackerOptions options;
+    options.rest_after = rest_after;
+    auto made = Tracker::Create(source, options);
+    EXPECT_TRUE(made.ok()) << made.status();
+    if (made.ok()) tracker = *std::move(made);
+  }
+
+  void Track(const Frame& frame) {
+    std::map<FeatureId, Eigen::Vector3d> now;
+    for (const FeatureSnapshot& feature : tracker->Track(frame)->features) {
+      now[feature.id] = feature.point_in_world;
+    }
+    if (frame.id == 36) newest = now.rbegin()->first;
+    known = still = 0;
+    for (const auto& [id, point] : now) {
+      if (id > newest || !points.contains(id)) continue;
+      ++known;
+      still += points.at(id) == point ? 1 : 0;
+    }
+    points = std::move(now);
+  }
+
+  std::unique_ptr<Tracker> tracker;
+  FeatureId newest = 0;
+  std::map<FeatureId, Eigen::Vector3d> points;
+  int known = 0, still = 0;
+};
+
+TEST(Dormancy, WhatIsOutOfSightStaysWhereItIs) {
+  auto source = SimSource::OpenUri("desk?motion=turn&seed=2", SourceOptions{});
+  ASSERT_TRUE(source.ok()) << source.status();
+  Watched resting((*source)->info(), TrackerOptions().rest_after), kept((*source)->info(), 0);
+  const Rigid3 begin = (*source)->WorldFromCamera(0);
+  constexpr double kAway_rad = 1.2;
+  int away = 0, most_kept_still = 0;
+  double share = 0;
+  for (FrameId k = 0; k < 260 && away < 60; ++k) {
+    const auto frame = (*source)->Next();
+    ASSERT_TRUE(frame.ok() && *frame);
+    resting.Track(**frame);
+    kept.Track(**frame);
+    if (RotationAngle(begin, (*source)->WorldFromCamera(k)) < kAway_rad) continue;
+    ++away;
+    if (away <= TrackerOptions().rest_after) continue;
+    most_kept_still = std::max(most_kept_still, kept.still);
+    share = std::max(share, static_cast<double>(resting.still) / std::max(1, resting.known));
+  }
+  std::printf("away for %d frames: %d known, at most %.0f %% of them still; kept: %d of %d\n", away,
+              resting.known, 100 * share, most_kept_still, kept.known);
+  EXPECT_GT(resting.known, 30);
+  EXPECT_GT(share, 0.25);
+  EXPECT_EQ(most_kept_still, 0) << "in the filter all move with all";
 }
 
 }  // namespace

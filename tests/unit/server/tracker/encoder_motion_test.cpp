@@ -78,5 +78,15 @@ TEST(EncoderMotion, UnknownUnitLeavesThePathUncertain) {
   EXPECT_LT((more - path * path.transpose()).norm(), 1e-12);
 }
 
+TEST(EncoderMotion, ASaccadeThatBeginsIsFasterThanItsMean) {
+  // From rest with 50 rad/s^2 in frames of 1/30 s: in the middle of an exposure the rate is twice
+  // the mean since the frame before.
+  constexpr double kAcceleration = 50.0;
+  const double mean = 0.5 * kAcceleration * kDt;
+  EXPECT_DOUBLE_EQ(RateWhenExposed(mean, 0.0), kAcceleration * kDt);
+  EXPECT_DOUBLE_EQ(RateWhenExposed(5.9, 5.9), 5.9) << "steady";
+  EXPECT_DOUBLE_EQ(RateWhenExposed(3.0, 5.9), 3.0) << "landing: no faster than on the average";
+}
+
 }  // namespace
 }  // namespace saccade
