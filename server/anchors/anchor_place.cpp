@@ -10,6 +10,8 @@ namespace saccade {
 namespace {
 
 constexpr Timestamp kReselectNs = 2'000'000'000;   // a better cluster is looked for this often
+constexpr double kSettled_s = 5.0;                 // seen for so long, its company stays
+constexpr double kLongestStep_s = 0.1;             // between frames; what is longer is a gap
 constexpr std::uint32_t kMinMatches = 3;           // before a seeded feature says anything
 constexpr std::uint32_t kManyMatches = 20;         // before it may overrule the click's own depth
 constexpr Timestamp kSeedGraceNs = 1'000'000'000;  // a seeded feature is in the map by then
@@ -104,12 +106,22 @@ void DropLostMembers(const MapView& map, AnchorPlace& place) {
   place.world_from_binding = world_before_from_binding;
 }
 
+/// Whether the camera looks there now.
+bool IsSeen(const MapView& map, const AnchorPlace& place) {
+  return std::any_of(place.members.begin(), place.members.end(), [&map](const auto& member) {
+    return map.Find(member.id)->state == FeatureState::kMeasured;
+  });
+}
+
 /// Adds the features that carry the anchor best now. New members enter with no residual, so nothing
 /// moves in this frame.
 void Replenish(const MapView& map, const AnchorOptions& options, AnchorPlace& place) {
   const Timestamp now_ns = map.snapshot().capture_time_ns;
   const bool full = place.members.size() >= static_cast<std::size_t>(options.cluster_size);
-  if (full && std::abs(now_ns - place.last_selected_ns) < kReselectNs) return;
+  // Members stay in the map when they leave the filter: choices out of sight, or later ones, would
+  // only take over what the map is wrong by at that moment.
+  const bool settled = place.was_tracking && (place.seen_s > kSettled_s || !IsSeen(map, place));
+  if (full && (settled || std::abs(now_ns - place.last_selected_ns) < kReselectNs)) return;
   place.last_selected_ns = now_ns;
   const Rigid3 binding_from_world = place.world_from_binding.Inverse();
   bool changed = false;
@@ -223,6 +235,10 @@ const FeatureSnapshot* MapView::Find(FeatureId id) const {
 }
 
 PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place) {
+  const Timestamp now_ns = map.snapshot().capture_time_ns;
+  const double dt =
+      place.last_time_ns == 0 ? 0 : std::max(0.0, Seconds(now_ns - place.last_time_ns));
+  place.last_time_ns = now_ns;
   DropLostMembers(map, place);
   place.world_from_binding = FitMembers(map, place);
   Replenish(map, options, place);
@@ -230,21 +246,22 @@ PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPla
     member.last_in_world = map.Find(member.id)->point_in_world;
   }
 
-  const Timestamp now_ns = map.snapshot().capture_time_ns;
+  if (place.was_tracking && IsSeen(map, place)) place.seen_s += std::min(dt, kLongestStep_s);
   if (place.placed_ns == 0) place.placed_ns = now_ns;
   PlaceEstimate estimate = FromCluster(map, place);
   if (place.seed) {
     if (const FeatureSnapshot* seed = map.Find(*place.seed)) {
       place.seed_seen = true;
       estimate = WithSeed(map, *seed, estimate, place);
+      // What it could teach it has taught; from now on six or more features know better than one
+      // where the place is.
+      const bool taught = seed->depth_known && seed->matched_count >= kManyMatches;
+      if (taught && !place.seed_is_target && place.seen_s > kSettled_s) ForgetSeed(place);
     } else if (place.seed_seen || now_ns - place.placed_ns > kSeedGraceNs) {
       ForgetSeed(place);
       estimate = FromCluster(map, place);
     }
   }
-  const double dt =
-      place.last_time_ns == 0 ? 0 : std::max(0.0, Seconds(now_ns - place.last_time_ns));
-  place.last_time_ns = now_ns;
   const Eigen::Vector3d wanted = place.world_from_binding.Inverse() * estimate.point_in_world;
   place.point += (1.0 - std::exp(-dt / options.refine_time_s)) * (wanted - place.point);
 

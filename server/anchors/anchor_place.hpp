@@ -61,6 +61,7 @@ struct AnchorPlace {
   Timestamp placed_ns = 0;
   Timestamp last_selected_ns = 0;  // members were last compared with the rest of the map
   bool was_tracking = false;       // has been sure once: now TRACKING or PAUSED, not PROVISIONAL
+  double seen_s = 0;               // since then a member was measured for so long
   bool paused = false;             // by its own error (hysteresis)
   Timestamp last_time_ns = 0;
 };

@@ -51,15 +51,19 @@ std::vector<std::pair<KeyframeId, std::vector<FeatureId>>> DormantLandmarks::InV
     if (std::any_of(occupied.begin(), occupied.end(), near)) continue;
     by_keyframe[known->anchor].push_back(id);
   }
+  std::erase_if(by_keyframe, [&](const auto& group) {
+    const auto seeded = [&](FeatureId id) { return landmarks_.at(id).landmark.seeded; };
+    return static_cast<int>(group.second.size()) < options_.fewest_together &&
+           std::none_of(group.second.begin(), group.second.end(), seeded);
+  });
   std::vector<std::pair<KeyframeId, std::vector<FeatureId>>> ranked(by_keyframe.begin(),
                                                                     by_keyframe.end());
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const auto& a, const auto& b) { return a.second.size() > b.second.size(); });
   int count = 0;
   const auto enough = [&](const auto& group) {
-    const int size = static_cast<int>(group.second.size());
-    if (size < options_.fewest_together || count >= wanted) return true;
-    count += size;
+    if (count >= wanted) return true;
+    count += static_cast<int>(group.second.size());
     return false;
   };
   ranked.erase(std::find_if(ranked.begin(), ranked.end(), enough), ranked.end());

@@ -29,7 +29,7 @@ struct DormantOptions {
   double max_scale = 2.0;  // nearer or farther than at birth
   double border_px = 20.0;
   double apart_px = 8.0;    // from what is in view already
-  int fewest_together = 4;  // of one keyframe, to be worth a pose clone
+  int fewest_together = 4;  // of one keyframe, to be worth a pose clone; a seeded one is alone
 };
 
 /// What the filter has no room for but the map still knows: landmarks that left the filter well

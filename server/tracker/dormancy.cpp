@@ -7,6 +7,7 @@ namespace {
 // Well enough known to be found again.
 constexpr std::uint32_t kMature = 15;       // matches
 constexpr double kDepthKnown = 0.1;         // sigma / inverse range
+constexpr double kSeedDepthKnown = 0.02;    // the same of a seeded one: a mark waits for its depth
 constexpr double kLeastDepthSigma = 0.005;  // a woken one's; of its inverse range
 constexpr std::int64_t kPause = 150;        // frames that one rests which was woken in vain
 constexpr int kMostFailures = 3;
@@ -27,7 +28,8 @@ bool Tracker::Impl::MayRest(const Landmark& landmark) const {
     return false;
   }
   const FeatureMarginal marginal = filter_.Marginal(landmark.id);
-  return marginal.inverse_range_sigma <= kDepthKnown * marginal.inverse_range;
+  const double enough = landmark.seeded ? kSeedDepthKnown : kDepthKnown;
+  return marginal.inverse_range_sigma <= enough * marginal.inverse_range;
 }
 
 void Tracker::Impl::Rest(std::span<const FeatureId> ids) {

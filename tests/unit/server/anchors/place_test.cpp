@@ -82,6 +82,35 @@ TEST(Place, LosingFeaturesNeverMovesTheAnchor) {
   EXPECT_LT((rig.Only().anchor.point_in_world - correction * before).norm(), 1e-3);
 }
 
+// New features near it, certain of themselves, that turn out to be elsewhere (the map was wrong for
+// a moment): who has its members keeps them.
+TEST(Place, ASettledAnchorKeepsItsCompany) {
+  for (const bool settled : {false, true}) {
+    Rig rig(SyntheticMap::Options{.features = 60});
+    const Rigid3 pose = LookFrom({0, 0, 0}, 0, 0.2);
+    rig.Show(pose);
+    const Eigen::Vector3d point = rig.Truth(pose, {330, 240});
+    ASSERT_TRUE(rig.PlaceAt(point, "e").ok());
+    rig.Show(pose);
+    for (int k = 0; settled && k < 170; ++k) rig.Show(pose);  // more than 5 s
+    std::vector<FeatureId> newcomers;
+    for (int k = 0; k < 8; ++k) {
+      newcomers.push_back(rig.map.Add(point + rig.map.Noise(0.03), 0.002));
+    }
+    rig.map.next_frame += 90;
+    rig.Show(pose);
+    const Eigen::Vector3d before = rig.Only().anchor.point_in_world;
+    for (const FeatureId id : newcomers) rig.map.Improve(id, 0.3);  // somewhere within 30 cm
+    rig.Show(pose);
+    const double moved = (rig.Only().anchor.point_in_world - before).norm();
+    if (settled) {
+      EXPECT_LT(moved, 1e-3);
+    } else {
+      EXPECT_GT(moved, 0.01) << "young, it looks for better company";
+    }
+  }
+}
+
 TEST(Place, SurvivesTheLossOfEveryFeature) {
   Rig rig;
   const Rigid3 pose = LookFrom({0, 0, 0}, 0, 0.2);

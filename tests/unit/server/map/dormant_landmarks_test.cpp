@@ -23,7 +23,7 @@ class DormantLandmarksTest : public testing::Test {
   }
 
   void Put(FeatureId id, KeyframeId keyframe, const Eigen::Vector3d& point, int matched = 20,
-           std::int64_t rests_until = 0) {
+           std::int64_t rests_until = 0, bool seeded = false) {
     const Rigid3 pose{Eigen::Quaterniond::Identity(),
                       Eigen::Vector3d(static_cast<double>(keyframe), 0, 0)};
     const Eigen::Vector3d seen = pose.Inverse() * point;
@@ -31,6 +31,7 @@ class DormantLandmarksTest : public testing::Test {
     DormantLandmark dormant;
     dormant.landmark.id = id;
     dormant.landmark.matched = static_cast<std::uint32_t>(matched);
+    dormant.landmark.seeded = seeded;
     dormant.rests_until = rests_until;
     dormant_.Put(std::move(dormant));
   }
@@ -99,6 +100,12 @@ TEST_F(DormantLandmarksTest, TheKeyframeThatShowsMostComesFirst) {
   Put(15, 1, {0.3, -0.2, 2});
   EXPECT_THAT(Seen(Rigid3(), 4), ElementsAre(11, 12, 13, 14, 15));
   EXPECT_THAT(Seen(Rigid3(), 9), ElementsAre(11, 12, 13, 14, 15, 1, 2, 3, 4));
+}
+
+TEST_F(DormantLandmarksTest, OneThatAMarkWaitsForIsWorthAPoseAlone) {
+  Put(1, 0, {0, 0, 2});
+  Put(2, 1, {0.2, 0, 2}, 20, 0, /*seeded=*/true);
+  EXPECT_THAT(Seen(Rigid3()), ElementsAre(2));
 }
 
 TEST_F(DormantLandmarksTest, IsBoundedAndForgetsWithTheGraph) {
