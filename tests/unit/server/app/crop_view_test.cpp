@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "shared/geometry/so3.hpp"
+#include "tests/support/pinhole.hpp"
 
 namespace saccade {
 namespace {
@@ -20,15 +21,7 @@ CameraIntrinsics Real() {
   camera.distortion = {-0.09, 0.035, 0.0006, -0.0004, 0.0};
   return camera;
 }
-CameraIntrinsics View() {
-  CameraIntrinsics view;
-  view.width = 320;
-  view.height = 240;
-  view.fx = view.fy = 458;
-  view.cx = 159.5;
-  view.cy = 119.5;
-  return view;
-}
+CameraIntrinsics View() { return Pinhole(320, 240, 458); }
 
 Eigen::Vector2d BrightestBlob(const cv::Mat& picture) {
   cv::Mat grey;

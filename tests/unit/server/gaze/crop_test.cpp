@@ -4,6 +4,7 @@
 
 #include "server/gaze/gaze_loop.hpp"
 #include "server/mount/crop_mount.hpp"
+#include "tests/support/pinhole.hpp"
 
 namespace saccade {
 namespace {
@@ -11,15 +12,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Timestamp kMs = 1'000'000;
 
-CameraIntrinsics Camera() {
-  CameraIntrinsics camera;
-  camera.width = 640;
-  camera.height = 480;
-  camera.fx = camera.fy = 458;
-  camera.cx = 319.5;
-  camera.cy = 239.5;
-  return camera;
-}
+CameraIntrinsics Camera() { return Pinhole(640, 480, 458); }
 
 /// Steps the loop on MonotonicNow-free time; the wearer, who carries the camera, rolls and sways.
 class CropWorld {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/pinhole.hpp"
+
 namespace saccade {
 namespace {
 
@@ -12,16 +14,6 @@ using ::testing::IsEmpty;
 /// A wall 2 m in front of the origin, seen from two keyframes: 0 straight on, 1 a metre aside.
 class DormantLandmarksTest : public testing::Test {
  protected:
-  DormantLandmarksTest() {
-    CameraIntrinsics intrinsics;
-    intrinsics.width = 640;
-    intrinsics.height = 480;
-    intrinsics.fx = intrinsics.fy = 500;
-    intrinsics.cx = 320;
-    intrinsics.cy = 240;
-    camera_ = CameraModel(intrinsics);
-  }
-
   void Put(FeatureId id, KeyframeId keyframe, const Eigen::Vector3d& point, int matched = 20,
            std::int64_t rests_until = 0, bool seeded = false) {
     const Rigid3 pose{Eigen::Quaterniond::Identity(),
@@ -57,7 +49,7 @@ class DormantLandmarksTest : public testing::Test {
     };
   }
 
-  CameraModel camera_;
+  CameraModel camera_{Pinhole(640, 480, 500)};
   std::map<FeatureId, KeyframeGraph::Remembered> known_;
   DormantLandmarks dormant_{DormantOptions()};
 };

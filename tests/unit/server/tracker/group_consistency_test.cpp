@@ -5,6 +5,7 @@
 #include <random>
 
 #include "server/filter/point_model.hpp"
+#include "tests/support/pinhole.hpp"
 
 namespace saccade {
 namespace {
@@ -16,13 +17,7 @@ constexpr int kGroups = 4, kInGroup = 12;
 class GroupConsistency : public testing::Test {
  protected:
   GroupConsistency() {
-    CameraIntrinsics intrinsics;
-    intrinsics.width = 640;
-    intrinsics.height = 480;
-    intrinsics.fx = intrinsics.fy = 500;
-    intrinsics.cx = 320;
-    intrinsics.cy = 240;
-    const CameraModel lens(intrinsics);
+    const CameraModel lens(Pinhole(640, 480, 500));
     const Rigid3 thought, truth{ExpQuaternion({0.012, -0.009, 0.006}), {0.02, -0.015, 0.02}};
     for (int group = 0; group < kGroups; ++group) {
       const Rigid3 clone{ExpQuaternion({0.1 * Uniform(), 0.1 * Uniform(), 0}),
