@@ -97,6 +97,27 @@ TEST_F(SaccadeEval, PointsScenarioIsTheSameTwice) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "a" / "run-000" / "anchors.csv"));
 }
 
+TEST_F(SaccadeEval, RecordWritesARecordingThatRuns) {
+  const std::filesystem::path recording = folder_ / "recording";
+  const Result written = Run(
+      "record --source 'sim:desk?seed=3&motion=twist' --frames 10:70 --out " + recording.string());
+  ASSERT_EQ(written.exit_code, 0) << written.err;
+  EXPECT_EQ(Lines(Read(recording / "rgb.txt")), 60);
+  EXPECT_EQ(Lines(Read(recording / "groundtruth.txt")), 60);
+  EXPECT_EQ(Read(recording / "rgb.txt").find("0.333333 rgb/0.333333.png\n"), 0u) << "frame 10";
+  const Result run =
+      Run("run --dataset " + recording.string() + " --json --out " + (folder_ / "run").string());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto report = nlohmann::json::parse(run.out);
+  EXPECT_EQ(report["frames"].get<int>(), 60);
+  EXPECT_GT(report["tracked_frames"].get<int>(), 40);
+  EXPECT_LT(report["ate_sim3_m"].get<double>(), 0.01);
+
+  const Result refused = Run("record --source sim:desk --frames 0:2 --out /proc/nowhere");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("/proc/nowhere"), std::string::npos) << refused.err;
+}
+
 TEST_F(SaccadeEval, RecordingRunsTheSameTwiceAndHalfIsThePrefix) {
   const std::string data = SACCADE_SOURCE_DIR "/../shared/data/checkerboard";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "checkerboard is not in ../shared/data";
