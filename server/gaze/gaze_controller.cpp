@@ -16,6 +16,7 @@ constexpr double kMaxStep_s = 0.05;
 // beyond any wearer's acceleration.
 constexpr double kJump_rad = 4 * kDegree, kJumpRate_rad_s = 20 * kDegree;
 constexpr double kJump_m = 0.10, kJumpRate_m_s = 0.5;
+constexpr double kLongestSaccade_s = 2.0;    // encoders and the wearer's inertia serve for so long
 constexpr double kCatchUp = 1.02;            // of the rate limit, for servos that lag behind
 constexpr Timestamp kRateSpan = 20'000'000;  // over which a moving goal's rate is taken
 
@@ -103,10 +104,20 @@ void GazeController::ObservePose(const PoseObservation& pose) {
     const double rate = (ToVector(pose.angles) - ToVector(before->angles)).cwiseAbs().maxCoeff() /
                         Seconds(pose.time_ns - before->time_ns);
     // In a fast saccade pictures are blurred; encoders and the wearer's inertia know better.
-    if (rate > options_.suspend_above_deg_s * kDegree) return;
+    if (rate > options_.suspend_above_deg_s * kDegree) {
+      carried_ns_ = pose.time_ns;
+      return;
+    }
   }
   const Rigid3 base = pose.world_from_camera * model_.MountFromCamera(pose.angles).Inverse();
   if (Believable(pose.time_ns, base)) wearer_.Add(pose.time_ns, base);
+}
+
+bool GazeController::IsStale(Timestamp now_ns) const {
+  const std::optional<Timestamp> newest = wearer_.newest_ns();
+  if (!newest) return true;
+  const bool carried = carried_ns_ > *newest && Seconds(carried_ns_ - *newest) < kLongestSaccade_s;
+  return Seconds(now_ns - (carried ? carried_ns_ : *newest)) > options_.pose_stale_s;
 }
 
 bool GazeController::Believable(Timestamp time_ns, const Rigid3& world_from_mount) const {
@@ -121,6 +132,7 @@ bool GazeController::Believable(Timestamp time_ns, const Rigid3& world_from_moun
 
 void GazeController::ForgetMap() {
   last_pose_.reset();
+  carried_ns_ = 0;
   wearer_.Clear();
   if (LooksAtTarget(report_.mode)) {
     Idle();
@@ -172,8 +184,7 @@ std::optional<FixationAngles> GazeController::AnglesFor(Timestamp time_ns,
 
 /// Where the joints should be when a command sent now takes effect, and how that moves.
 std::optional<GazeController::Goal> GazeController::MovingGoal(Timestamp now_ns) {
-  const std::optional<Timestamp> newest = wearer_.newest_ns();
-  if (!newest || Seconds(now_ns - *newest) > options_.pose_stale_s) {
+  if (IsStale(now_ns)) {
     if (report_.problem.empty()) {
       report_.problem = "tracking is lost: the head rests until it is back";
     }
@@ -292,9 +303,7 @@ void GazeController::Judge(Timestamp now_ns, const std::optional<EncoderReading>
   }
   // Of the encoders' moment: nobody knows more of the present.
   const std::optional<Rigid3> wearer = wearer_.At(encoder->time_ns);
-  const bool stale = !wearer_.newest_ns() ||
-                     Seconds(now_ns - *wearer_.newest_ns()) > options_.pose_stale_s ||
-                     Seconds(now_ns - encoder->time_ns) > options_.pose_stale_s;
+  const bool stale = IsStale(now_ns) || Seconds(now_ns - encoder->time_ns) > options_.pose_stale_s;
   if (!wearer || stale) {
     within_since_ns_.reset();
     report_.arrived = false;

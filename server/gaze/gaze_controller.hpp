@@ -82,6 +82,8 @@ class GazeController {
     Eigen::Vector3d angles, rates;
   };
   void SetMode(GazeMode mode);
+  /// Where the wearer is now is not known any more.
+  bool IsStale(Timestamp now_ns) const;
   bool Believable(Timestamp time_ns, const Rigid3& world_from_mount) const;
   double Horizon_s() const;
   std::optional<FixationAngles> AnglesFor(Timestamp time_ns, const MountAngles& near) const;
@@ -96,6 +98,7 @@ class GazeController {
   const GazeOptions options_;
   WearerPredictor wearer_;
   std::optional<PoseObservation> last_pose_;
+  Timestamp carried_ns_ = 0;  // newest pose that was not used because the head was fast
   std::optional<Eigen::Vector3d> down_, target_;
   std::array<AxisProfile, kMountJoints> axes_;
   Eigen::Vector3d horizon_hold_ = Eigen::Vector3d::Zero();

@@ -127,5 +127,37 @@ TEST(ClosedLoop, TheSameRunTwiceIsTheSameToTheBit) {
   EXPECT_EQ(ends[0], ends[1]);
 }
 
+// Three quarters of a circle take longer than poses may be missing: those in between are blurred by
+// the head's own motion, which is no reason to rest half-way.
+TEST(ClosedLoop, ALongFastSaccadeIsOne) {
+  ClosedLoop world(StandStill);
+  world.Run(0.5);
+  const auto at = [](double azimuth_deg) {
+    const double a = azimuth_deg * kDegree;
+    return Eigen::Vector3d(1.5 * std::sin(a), 0, 1.5 * std::cos(a));
+  };
+  const double end = world.mount().model().options().of(MountJoint::kPan).max_rad / kDegree;
+  // The way round beyond the joint's end is barred.
+  for (double goal = 120; goal < end - 20; goal += 120) Look(world, at(goal), /*fast=*/true, 3.0);
+  const Eigen::Vector3d target = at(end + 20);
+  EXPECT_TRUE(world.loop().Fixate(GazePoint{target}, /*fast=*/true).ok());
+  const double begin = world.now_s(), from = world.mount().TrueAngles(world.now_ns()).pan_rad;
+  double before = from, slowest_deg_s = 1e3, blind_s = 0;
+  world.Run(3.0, [&] {
+    const double pan = world.mount().TrueAngles(world.now_ns()).pan_rad;
+    const double rate = std::abs(pan - before) / 0.01 / kDegree;
+    before = pan;
+    const double way = std::abs(pan - from) / kDegree;
+    if (way > 60 && way < 180) slowest_deg_s = std::min(slowest_deg_s, rate);
+    if (rate > 90) blind_s = world.now_s() - begin;
+  });
+  std::printf("%.0f deg: at least %.0f deg/s, without a pose for %.2f s\n",
+              std::abs(before - from) / kDegree, slowest_deg_s, blind_s);
+  EXPECT_GT(std::abs(before - from) / kDegree, 200);
+  EXPECT_GT(blind_s, GazeOptions().pose_stale_s);
+  EXPECT_GT(slowest_deg_s, 300);
+  EXPECT_LT(world.TrueError_deg(target), 1.0);
+}
+
 }  // namespace
 }  // namespace saccade
