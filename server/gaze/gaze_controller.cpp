@@ -109,6 +109,7 @@ void GazeController::ObservePose(const PoseObservation& pose) {
       return;
     }
   }
+  if (!pose.sure) return;
   const Rigid3 base = pose.world_from_camera * model_.MountFromCamera(pose.angles).Inverse();
   if (Believable(pose.time_ns, base)) wearer_.Add(pose.time_ns, base);
 }

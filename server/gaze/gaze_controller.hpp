@@ -20,6 +20,7 @@ struct PoseObservation {
   Timestamp time_ns = 0;  // mid-exposure
   Rigid3 world_from_camera;
   MountAngles angles;
+  bool sure = true;  // false: the tracker only guesses, but it is not lost
 };
 
 /// What the controller can tell about itself after a step.
@@ -58,9 +59,9 @@ class GazeController {
 
   /// Direction of gravity in world; nothing: unknown, the picture is not levelled.
   void SetDown(const std::optional<Eigen::Vector3d>& down_in_world) { down_ = down_in_world; }
-  /// A new pose of the tracker, only while it tracks. What no wearer can have done since the pose
-  /// before is not believed (a tracker that has lost its way in a fast saccade), for as long as
-  /// that was not long ago.
+  /// A new pose of the tracker, as long as it is not lost. What no wearer can have done since the
+  /// pose before is not believed (a tracker that has lost its way in a fast saccade), for as long
+  /// as that was not long ago.
   void ObservePose(const PoseObservation& pose);
   /// Somebody else has moved the head: the next step begins where the encoders say.
   void LoseSync() { synchronised_ = false; }

@@ -178,8 +178,10 @@ void GazeLoop::OnView(const GazeView& view) {
   // Meanwhile nobody knows how the joints turn the camera.
   if (calibration_.running()) return calibration_.OnView(*view.map);
   controller_.SetDown(view.down_in_world);
-  if (HasPose(*view.map) && view.angles) {
-    controller_.ObservePose({view.map->capture_time_ns, view.map->world_from_camera, *view.angles});
+  const TrackingStatus status = view.map->status;
+  if (view.angles && (status == TrackingStatus::kTracking || status == TrackingStatus::kCoasting)) {
+    controller_.ObservePose(
+        {view.map->capture_time_ns, view.map->world_from_camera, *view.angles, HasPose(*view.map)});
   }
   if (target_) controller_.UpdateTarget(PointOf(*target_));
 }

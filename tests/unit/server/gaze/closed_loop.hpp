@@ -15,7 +15,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Timestamp kMs = 1'000'000;
 
 /// Gaze control on a simulated head and a wearer who moves as told; poses are exact and late, as
-/// if a perfect tracker had published them. Control at 100 Hz, frames at 30 Hz.
+/// if a perfect tracker had published them, one that like the real one is coasting while the head
+/// is fast. Control at 100 Hz, frames at 30 Hz.
 class ClosedLoop {
  public:
   using Wearer = std::function<Rigid3(double time_s)>;
@@ -88,6 +89,14 @@ class ClosedLoop {
     map_.world_from_camera = wearer_(Seconds(frame_ns)) *
                              mount_.true_model().MountFromCamera(mount_.TrueAngles(frame_ns));
     map_.world_from_camera.rotation = map_.world_from_camera.rotation * pose_error_;
+    Eigen::Vector3d turned = Eigen::Vector3d::Zero();
+    if (read && last_read_) turned = ToVector(*read) - ToVector(*last_read_);
+    constexpr double kSuspended_rad = 2.0 / 30.0;
+    if (map_.status == TrackingStatus::kTracking || map_.status == TrackingStatus::kCoasting) {
+      map_.status =
+          turned.norm() > kSuspended_rad ? TrackingStatus::kCoasting : TrackingStatus::kTracking;
+    }
+    last_read_ = read;
     GazeView view;
     view.map = std::make_shared<const MapSnapshot>(map_);
     view.annotations = std::make_shared<const std::vector<Annotation>>(annotations_);
@@ -106,6 +115,7 @@ class ClosedLoop {
   bool tracking_ = true, have_last_ = false;
   Eigen::Quaterniond pose_error_ = Eigen::Quaterniond::Identity();
   Eigen::Vector3d last_;
+  std::optional<MountAngles> last_read_;  // of the frame before
   double peak_rate_deg_s_ = 0;
 };
 
