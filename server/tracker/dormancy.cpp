@@ -8,6 +8,7 @@ namespace {
 constexpr std::uint32_t kMature = 15;       // matches
 constexpr double kDepthKnown = 0.1;         // sigma / inverse range
 constexpr double kSeedDepthKnown = 0.02;    // the same of a seeded one: a mark waits for its depth
+constexpr double kMoved = 0.1;              // of the distance to what is in view
 constexpr double kLeastDepthSigma = 0.005;  // a woken one's; of its inverse range
 constexpr std::int64_t kPause = 150;        // frames that one rests which was woken in vain
 constexpr int kMostFailures = 3;
@@ -30,6 +31,14 @@ bool Tracker::Impl::MayRest(const Landmark& landmark) const {
   const FeatureMarginal marginal = filter_.Marginal(landmark.id);
   const double enough = landmark.seeded ? kSeedDepthKnown : kDepthKnown;
   return marginal.inverse_range_sigma <= enough * marginal.inverse_range;
+}
+
+bool Tracker::Impl::HasMovedFrom(const Landmark& landmark) const {
+  const auto known = refiner_.Remember(landmark.id);
+  if (!known) return false;
+  const Eigen::Vector3d way =
+      filter_.camera().world_from_camera.translation - known->world_from_anchor.translation;
+  return way.norm() * depth_.inverse_range > kMoved;
 }
 
 void Tracker::Impl::Rest(std::span<const FeatureId> ids) {

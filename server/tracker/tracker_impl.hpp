@@ -42,6 +42,10 @@ class Tracker::Impl {
   void MoveHome();
   /// Whether a feature is known well enough to be woken one day.
   bool MayRest(const Landmark& landmark) const;
+  /// Whether the camera is elsewhere than where it saw the landmark first. One that only turns
+  /// keeps what it has: a pose that is woken could be anywhere within a percent of the distance,
+  /// and as much parallax would be invented.
+  bool HasMovedFrom(const Landmark& landmark) const;
   /// Takes features out of the filter; those that may rest are only put to rest.
   void Rest(std::span<const FeatureId> ids);
   /// Takes landmarks at rest back that should be in view, where the filter has too few.
