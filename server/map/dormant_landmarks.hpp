@@ -32,9 +32,9 @@ struct DormantOptions {
   int fewest_together = 4;  // of one keyframe, to be worth a pose clone; a seeded one is alone
 };
 
-/// What the filter has no room for but the map still knows: landmarks that left the filter well
-/// measured, to be woken where they come back into view (slam-spec 6, T17, T19). The tracker's
-/// thread owns it.
+/// What is out of sight, or the filter has no room for, but the map still knows: landmarks that
+/// left it well measured, to be woken where they come back into view (slam-spec 6, T17, T19). The
+/// tracker's thread owns it.
 class DormantLandmarks {
  public:
   using Lookup = std::function<std::optional<KeyframeGraph::Remembered>(FeatureId)>;

@@ -127,7 +127,7 @@ TEST(ClosedLoop, TheSameRunTwiceIsTheSameToTheBit) {
   EXPECT_EQ(ends[0], ends[1]);
 }
 
-// Three quarters of a circle take longer than poses may be missing: those in between are blurred by
+// More than half a circle takes longer than poses may be missing: those in between are blurred by
 // the head's own motion, which is no reason to rest half-way.
 TEST(ClosedLoop, ALongFastSaccadeIsOne) {
   ClosedLoop world(StandStill);
