@@ -27,7 +27,7 @@ json Upper(const Eigen::MatrixXd& symmetric) {
 json ToJson(const std::vector<net::Participant>& participants) {
   json list = json::array();
   for (const net::Participant& participant : participants) {
-    list.push_back({{"session_id", participant.session_id},
+    list.push_back({{"participant_id", participant.participant_id},
                     {"display_name", participant.display_name},
                     {"role", Word(participant.role)}});
   }

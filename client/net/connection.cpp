@@ -303,7 +303,7 @@ absl::StatusOr<Lease> Connection::AcquireLease(const std::string& lease_id) {
   return Lease{response->granted(),
                response->lease_id(),
                response->queue_position(),
-               {response->pilot().session_id(), response->pilot().display_name()}};
+               {response->pilot().participant_id(), response->pilot().display_name()}};
 }
 
 absl::Status Connection::ReleaseLease() {

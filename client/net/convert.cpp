@@ -73,7 +73,7 @@ Statistics FromProto(const v1::StatisticsEvent& message) {
 std::vector<Participant> FromProto(const v1::PresenceEvent& message) {
   std::vector<Participant> participants;
   for (const v1::Participant& participant : message.participants()) {
-    participants.push_back({.session_id = participant.session_id(),
+    participants.push_back({.participant_id = participant.participant_id(),
                             .display_name = participant.display_name(),
                             .role = RoleFromProto(participant.role())});
   }

@@ -20,7 +20,7 @@ enum class Role { kExpert, kWearer, kViewer };
 enum class VideoView { kRaw, kAugmented };
 
 struct Participant {
-  std::string session_id;
+  std::string participant_id;
   std::string display_name;
   Role role = Role::kViewer;
 };

@@ -37,7 +37,7 @@ std::string Words(Handover::Why why, const std::optional<GazePilot>& from,
 }  // namespace
 
 bool GazeArbiter::Holds(const GazeCaller& caller) const {
-  return lease_ && lease_->caller.pilot.session_id == caller.pilot.session_id;
+  return lease_ && lease_->caller.pilot.participant_id == caller.pilot.participant_id;
 }
 
 std::optional<GazePilot> GazeArbiter::pilot() const {
@@ -61,7 +61,7 @@ void GazeArbiter::Hand(Handover::Why why, std::optional<GazeCaller> to, Timestam
   if (to) {
     change.to = to->pilot;
     std::erase_if(queue_, [&](const Waiting& waiting) {
-      return waiting.caller.pilot.session_id == to->pilot.session_id;
+      return waiting.caller.pilot.participant_id == to->pilot.participant_id;
     });
     lease_ = Lease{new_id_(), *std::move(to), now_ns + Ns(grace_s)};
   } else {
@@ -98,7 +98,7 @@ absl::StatusOr<LeaseAnswer> GazeArbiter::Acquire(const GazeCaller& caller,
     return answer;
   }
   auto place = std::find_if(queue_.begin(), queue_.end(), [&](const Waiting& waiting) {
-    return waiting.caller.pilot.session_id == caller.pilot.session_id;
+    return waiting.caller.pilot.participant_id == caller.pilot.participant_id;
   });
   if (place == queue_.end()) place = queue_.insert(queue_.end(), {caller, now_ns});
   place->seen_ns = now_ns;
@@ -112,7 +112,7 @@ absl::Status GazeArbiter::Release(const GazeCaller& caller, Timestamp now_ns) {
     return absl::OkStatus();
   }
   const std::size_t left = std::erase_if(queue_, [&](const Waiting& waiting) {
-    return waiting.caller.pilot.session_id == caller.pilot.session_id;
+    return waiting.caller.pilot.participant_id == caller.pilot.participant_id;
   });
   if (left > 0) return absl::OkStatus();
   return absl::FailedPreconditionError("lease: you neither hold it nor wait for it");

@@ -69,15 +69,15 @@ grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext*
   if (!session.ok()) return Refuse(reactor, "Create", "", session.status());
   if (!request->request_id().empty()) {
     absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
-    if (!uuid.ok()) return Refuse(reactor, "Create", session->id, uuid);
+    if (!uuid.ok()) return Refuse(reactor, "Create", session->participant_id, uuid);
   }
   absl::StatusOr<AnnotationDraft> draft = wire::FromProto(request->draft(), ImageOf(backend_));
-  if (!draft.ok()) return Refuse(reactor, "Create", session->id, draft.status());
+  if (!draft.ok()) return Refuse(reactor, "Create", session->participant_id, draft.status());
   draft->request_id = request->request_id();
   draft->author = session->display_name;
-  Submit(reactor, "Create", session->id,
-         CreateAnnotation{session->id, *std::move(draft),
-                          Answer(reactor, response, "Create", session->id)});
+  Submit(reactor, "Create", session->participant_id,
+         CreateAnnotation{session->participant_id, *std::move(draft),
+                          Answer(reactor, response, "Create", session->participant_id)});
   return reactor;
 }
 
@@ -88,10 +88,10 @@ grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext*
   const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
   if (!session.ok()) return Refuse(reactor, "Update", "", session.status());
   absl::StatusOr<AnnotationPatch> patch = PatchFromProto(*request, ImageOf(backend_));
-  if (!patch.ok()) return Refuse(reactor, "Update", session->id, patch.status());
-  Submit(reactor, "Update", session->id,
-         UpdateAnnotation{session->id, *std::move(patch),
-                          Answer(reactor, response, "Update", session->id)});
+  if (!patch.ok()) return Refuse(reactor, "Update", session->participant_id, patch.status());
+  Submit(reactor, "Update", session->participant_id,
+         UpdateAnnotation{session->participant_id, *std::move(patch),
+                          Answer(reactor, response, "Update", session->participant_id)});
   return reactor;
 }
 
@@ -102,11 +102,11 @@ grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext*
   const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
   if (!session.ok()) return Refuse(reactor, "Delete", "", session.status());
   if (absl::Status uuid = wire::CheckUuid(request->id(), "id"); !uuid.ok()) {
-    return Refuse(reactor, "Delete", session->id, uuid);
+    return Refuse(reactor, "Delete", session->participant_id, uuid);
   }
-  Submit(reactor, "Delete", session->id,
-         DeleteAnnotation{session->id, request->id(),
-                          [reactor, id = session->id](const absl::Status& status) {
+  Submit(reactor, "Delete", session->participant_id,
+         DeleteAnnotation{session->participant_id, request->id(),
+                          [reactor, id = session->participant_id](const absl::Status& status) {
                             Audit("Delete", id, status);
                             reactor->Finish(ToGrpc(status));
                           }});
@@ -134,10 +134,10 @@ void AnnotationService::TakeBack(grpc::ServerUnaryReactor* reactor, const std::s
     Refuse(reactor, method, "", session.status());
     return;
   }
-  Submit(reactor, method, session->id,
-         UndoChange{session->id, redo,
+  Submit(reactor, method, session->participant_id,
+         UndoChange{session->participant_id, redo,
                     [reactor, response, method,
-                     id = session->id](const absl::StatusOr<std::string>& description) {
+                     id = session->participant_id](const absl::StatusOr<std::string>& description) {
                       if (description.ok()) response->set_description(*description);
                       Audit(method, id, description.status());
                       reactor->Finish(ToGrpc(description.status()));

@@ -40,7 +40,8 @@ DoneEmpty Answer(grpc::ServerUnaryReactor* reactor, const char* method,
 absl::StatusOr<GazeCaller> GazeService::CallerOf(const std::string& session_id) {
   const absl::StatusOr<Session> session = sessions_.FindEditor(session_id);
   if (!session.ok()) return session.status();
-  return GazeCaller{{session->id, session->display_name}, session->role == v1::ROLE_WEARER};
+  return GazeCaller{{session->participant_id, session->display_name},
+                    session->role == v1::ROLE_WEARER};
 }
 
 void GazeService::Submit(Reactor* reactor, const char* method, const std::string& session_id,
@@ -64,7 +65,7 @@ grpc::ServerUnaryReactor* GazeService::AcquireLease(Context* context,
   Reactor* reactor = context->DefaultReactor();
   absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
   if (!caller.ok()) return Refuse(reactor, "AcquireLease", "", caller.status());
-  const std::string session_id = caller->pilot.session_id;
+  const std::string session_id = caller->pilot.participant_id;
   const bool renews = !request->lease_id().empty();
   if (renews) {
     absl::Status uuid = wire::CheckUuid(request->lease_id(), "lease_id");
@@ -93,7 +94,7 @@ grpc::ServerUnaryReactor* GazeService::ReleaseLease(Context* context,
   Reactor* reactor = context->DefaultReactor();
   absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
   if (!caller.ok()) return Refuse(reactor, "ReleaseLease", "", caller.status());
-  const std::string id = caller->pilot.session_id;
+  const std::string id = caller->pilot.participant_id;
   Submit(reactor, "ReleaseLease", id,
          ReleaseGazeLease{*std::move(caller), Answer(reactor, "ReleaseLease", id)});
   return reactor;
@@ -104,7 +105,7 @@ grpc::ServerUnaryReactor* GazeService::Fixate(Context* context, const v1::Fixate
   Reactor* reactor = context->DefaultReactor();
   absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
   if (!caller.ok()) return Refuse(reactor, "Fixate", "", caller.status());
-  const std::string id = caller->pilot.session_id;
+  const std::string id = caller->pilot.participant_id;
   absl::StatusOr<GazeTarget> target = wire::FromProto(request->target(), "target");
   if (!target.ok()) return Refuse(reactor, "Fixate", id, target.status());
   Submit(reactor, "Fixate", id,
@@ -120,7 +121,7 @@ grpc::ServerUnaryReactor* GazeService::Steer(Context* context, const Request* re
   Reactor* reactor = context->DefaultReactor();
   absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
   if (!caller.ok()) return Refuse(reactor, method, "", caller.status());
-  const std::string id = caller->pilot.session_id;
+  const std::string id = caller->pilot.participant_id;
   Submit(reactor, method, id,
          SteerGaze{*std::move(caller), what, AnswerWithState(reactor, response, method, id)});
   return reactor;
@@ -175,7 +176,7 @@ grpc::ServerUnaryReactor* GazeService::Override(Context* context,
   Reactor* reactor = context->DefaultReactor();
   absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
   if (!caller.ok()) return Refuse(reactor, "Override", "", caller.status());
-  const std::string id = caller->pilot.session_id;
+  const std::string id = caller->pilot.participant_id;
   Submit(reactor, "Override", id,
          OverrideGaze{*std::move(caller), request->enabled(), Answer(reactor, "Override", id)});
   return reactor;
@@ -186,7 +187,7 @@ grpc::ServerUnaryReactor* GazeService::Pause(Context* context, const v1::PauseRe
   Reactor* reactor = context->DefaultReactor();
   absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
   if (!caller.ok()) return Refuse(reactor, "Pause", "", caller.status());
-  const std::string id = caller->pilot.session_id;
+  const std::string id = caller->pilot.participant_id;
   Submit(reactor, "Pause", id,
          PauseGaze{*std::move(caller), request->paused(), Answer(reactor, "Pause", id)});
   return reactor;

@@ -62,7 +62,7 @@ grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context
                                             v1::ResetMapResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
-  const std::string id = session.ok() ? session->id : "";
+  const std::string id = session.ok() ? session->participant_id : "";
   absl::Status status = session.status();
   if (status.ok()) {
     status = backend_.Submit(

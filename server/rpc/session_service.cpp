@@ -33,10 +33,11 @@ grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* cont
                                                v1::JoinResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const absl::StatusOr<Session> session = sessions_.Join(*request);
-  Audit("Join", session.ok() ? session->id : "", session.status());
+  Audit("Join", session.ok() ? session->participant_id : "", session.status());
   if (!session.ok()) return Finish(reactor, session.status());
   const ServerFacts& facts = backend_.facts();
   response->set_session_id(session->id);
+  response->set_participant_id(session->participant_id);
   response->set_server_version(facts.version);
   response->set_source(facts.source);
   *response->mutable_intrinsics() = wire::ToProto(facts.camera->intrinsics());
@@ -49,7 +50,7 @@ grpc::ServerWriteReactor<v1::Event>* SessionService::Subscribe(
   const absl::StatusOr<Session> session = sessions_.Find(request->session_id());
   if (!session.ok()) return new RefusedStream(session.status());
   const absl::StatusOr<SubscriptionOptions> options = SubscriptionOptions::FromProto(*request);
-  Audit("Subscribe", session->id, options.status());
+  Audit("Subscribe", session->participant_id, options.status());
   if (!options.ok()) return new RefusedStream(options.status());
   return StreamWriter::Open(hub_, *session, *options);
 }

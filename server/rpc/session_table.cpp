@@ -30,6 +30,7 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request) {
   }
   Session session;
   session.id = NewUuid();
+  session.participant_id = NewUuid();
   session.display_name = request.display_name().empty() ? "guest" : request.display_name();
   if (request.role() != v1::ROLE_UNSPECIFIED) session.role = request.role();
   const std::lock_guard lock(mutex_);
@@ -43,7 +44,7 @@ void SessionTable::MakeRoom() {
   const auto oldest = std::min_element(
       sessions_.begin(), sessions_.end(),
       [](const auto& a, const auto& b) { return a.second.used_ns < b.second.used_ns; });
-  gone_.push_back(oldest->first);
+  gone_.push_back(oldest->second.session.participant_id);
   sessions_.erase(oldest);
   std::erase_if(gone_, [this](const std::string& id) { return !on_gone_ || on_gone_(id); });
 }

@@ -16,7 +16,8 @@
 namespace saccade {
 
 struct Session {
-  std::string id;  // UUID
+  std::string id;              // UUID; the credential: for no log and nobody else
+  std::string participant_id;  // UUID; what others know it by
   std::string display_name;
   v1::Role role = v1::ROLE_EXPERT;
 };
@@ -24,10 +25,10 @@ struct Session {
 /// Who joined. Bounded: above `max_sessions` the one unused for longest goes. Thread safe.
 class SessionTable {
  public:
-  /// Told the id of each session that goes, so that what is kept for it elsewhere goes too; false:
-  /// not now, and it is told again with the next one. Called from Join(); must not block or call
-  /// back.
-  using OnGone = std::function<bool(const std::string& session_id)>;
+  /// Told the participant_id of each session that goes, so that what is kept for it elsewhere goes
+  /// too; false: not now, and it is told again with the next one. Called from Join(); must not
+  /// block or call back.
+  using OnGone = std::function<bool(const std::string& participant_id)>;
 
   explicit SessionTable(std::size_t max_sessions = 1000, OnGone on_gone = nullptr)
       : max_sessions_(max_sessions), on_gone_(std::move(on_gone)) {}

@@ -132,7 +132,7 @@ void StreamHub::StreamsChanged() {
     const std::lock_guard lock(mutex_);
     for (const auto& stream : streams_) {
       v1::Participant& participant = *presence->add_participants();
-      participant.set_session_id(stream->session().id);
+      participant.set_participant_id(stream->session().participant_id);
       participant.set_display_name(stream->session().display_name);
       participant.set_role(stream->session().role);
       if (stream->wants_video()) wanted[static_cast<std::size_t>(stream->view())] = true;

@@ -68,7 +68,7 @@ void StreamWriter::OnCancel() {
 
 void StreamWriter::OnDone() {
   hub_.Remove(this);
-  Audit("Subscribe/end", session_.id, absl::OkStatus());
+  Audit("Subscribe/end", session_.participant_id, absl::OkStatus());
   // The hub may still hold a reference for the length of one Distribute.
   const std::shared_ptr<StreamWriter> last = std::move(self_);
 }

@@ -38,7 +38,7 @@ using GazeTarget = std::variant<GazeAnnotation, GazeFeature, GazePoint>;
 
 /// Someone who pilots, or waits to.
 struct GazePilot {
-  std::string session_id;
+  std::string participant_id;  // public; not the session's credential
   std::string display_name;
 };
 

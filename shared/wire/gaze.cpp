@@ -15,7 +15,7 @@ absl::Status Bad(absl::string_view field, absl::string_view problem) {
 }
 
 GazePilot PilotFromProto(const v1::GazePilot& message) {
-  return {message.session_id(), message.display_name()};
+  return {message.participant_id(), message.display_name()};
 }
 
 // The enum and its message count alike from NO_MOUNT = 1.
@@ -60,7 +60,7 @@ v1::GazeTarget ToProto(const GazeTarget& target) {
 
 v1::GazePilot ToProto(const GazePilot& pilot) {
   v1::GazePilot message;
-  message.set_session_id(pilot.session_id);
+  message.set_participant_id(pilot.participant_id);
   message.set_display_name(pilot.display_name);
   return message;
 }

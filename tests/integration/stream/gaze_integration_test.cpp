@@ -154,7 +154,8 @@ TEST(Gaze, ThePilotTurnsTheHeadAndEverybodySeesIt) {
     bool saccade = false, held = false;
     for (const ReceivedEvent& one : events) {
       const v1::GazeState& state = one.event.gaze();
-      if (!one.event.has_gaze() || state.pilot().session_id() != pilot.client().session_id())
+      if (!one.event.has_gaze() ||
+          state.pilot().participant_id() != pilot.client().participant_id())
         continue;
       saccade |= state.mode() == v1::GAZE_MODE_SACCADE;
       held |= saccade && state.arrived() && state.error_rad() < 0.035;
@@ -228,13 +229,13 @@ TEST(Gaze, TwoExpertsOneHead) {
   const v1::AcquireLeaseResponse waits = bob.Acquire();
   EXPECT_FALSE(waits.granted());
   EXPECT_EQ(waits.queue_position(), 1u);
-  EXPECT_EQ(waits.pilot().session_id(), ann.client().session_id());
+  EXPECT_EQ(waits.pilot().participant_id(), ann.client().participant_id());
   const grpc::Status refused = bob.Fixate(1, 0, 1);
   EXPECT_EQ(refused.error_code(), grpc::StatusCode::PERMISSION_DENIED);
   EXPECT_THAT(refused.error_message(), HasSubstr("pilots"));
   ann.Fall();
   ASSERT_TRUE(ann.Call(&v1::GazeService::Stub::ReleaseLease).ok());
-  EXPECT_EQ(bob.State().pilot().session_id(), bob.client().session_id());
+  EXPECT_EQ(bob.State().pilot().participant_id(), bob.client().participant_id());
   EXPECT_TRUE(bob.Acquire().granted());
 }
 
@@ -262,11 +263,11 @@ TEST(Gaze, TheWearerTakesOverStopsAndPauses) {
   v1::OverrideRequest take;
   take.set_enabled(true);
   ASSERT_TRUE(wearer.Call(&v1::GazeService::Stub::Override, take).ok());
-  EXPECT_EQ(wearer.State().pilot().session_id(), wearer.client().session_id());
+  EXPECT_EQ(wearer.State().pilot().participant_id(), wearer.client().participant_id());
   EXPECT_EQ(expert.Fixate(0, 0, 1).error_code(), grpc::StatusCode::PERMISSION_DENIED);
   take.set_enabled(false);
   ASSERT_TRUE(wearer.Call(&v1::GazeService::Stub::Override, take).ok());
-  EXPECT_EQ(wearer.State().pilot().session_id(), expert.client().session_id());
+  EXPECT_EQ(wearer.State().pilot().participant_id(), expert.client().participant_id());
   v1::PauseRequest pause;
   pause.set_paused(true);
   ASSERT_TRUE(wearer.Call(&v1::GazeService::Stub::Pause, pause).ok());

@@ -32,6 +32,7 @@ TestClient::TestClient(const std::string& address, v1::Role role) {
   v1::JoinResponse response;
   Must(session_->Join(&context, request, &response), "Join");
   session_id_ = response.session_id();
+  participant_id_ = response.participant_id();
 }
 
 void TestClient::Subscribe(v1::SubscribeRequest request, bool acknowledge) {

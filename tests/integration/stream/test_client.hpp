@@ -33,6 +33,7 @@ class TestClient {
   ~TestClient() { Leave(); }
 
   const std::string& session_id() const { return session_id_; }
+  const std::string& participant_id() const { return participant_id_; }
   v1::SessionService::Stub& session() { return *session_; }
   v1::AnnotationService::Stub& annotations() { return *annotations_; }
   v1::MapService::Stub& map() { return *map_; }
@@ -66,6 +67,7 @@ class TestClient {
   std::unique_ptr<v1::AnnotationService::Stub> annotations_;
   std::unique_ptr<v1::MapService::Stub> map_;
   std::string session_id_;
+  std::string participant_id_;
   std::unique_ptr<grpc::ClientContext> context_;
   std::unique_ptr<grpc::ClientReader<v1::Event>> reader_;
   mutable std::mutex mutex_;

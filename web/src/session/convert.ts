@@ -186,7 +186,7 @@ export function toAnnotation(pb: PbAnnotation): Annotation {
 }
 
 export const toParticipant = (pb: PbParticipant): Participant => ({
-  sessionId: pb.sessionId,
+  participantId: pb.participantId,
   name: pb.displayName,
   role: roles[pb.role],
 });

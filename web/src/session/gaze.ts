@@ -18,7 +18,7 @@ export type GazeTarget =
 
 /** Someone who steers the head, or waits to. */
 export interface Pilot {
-  readonly sessionId: string;
+  readonly participantId: string;
   readonly name: string;
 }
 

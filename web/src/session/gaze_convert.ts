@@ -22,7 +22,7 @@ const modes: Record<PbMode, GazeMode> = {
 };
 
 const toPilot = (pb: PbPilot): Pilot => ({
-  sessionId: pb.sessionId,
+  participantId: pb.participantId,
   name: pb.displayName || 'somebody',
 });
 

@@ -105,7 +105,7 @@ export class GazePilot {
   async stop(): Promise<void> {
     const pilot = this.session.gaze?.pilot;
     if (this.holds) return this.command('stopFixating');
-    if (pilot && pilot.sessionId !== this.session.sessionId) {
+    if (pilot && pilot.participantId !== this.session.participantId) {
       throw new GazeError(`${pilot.name} pilots: only ${pilot.name} or the wearer can stop it.`);
     }
     const granted = await this.acquire();
@@ -185,7 +185,7 @@ export class GazePilot {
 
   /** The lease is somebody else's. Whom the wearer took it from is first in the queue, and stays. */
   private async dropped(reason: string): Promise<void> {
-    const sessionId = this.owner;
+    const me = this.session.participantId;
     void this.end(`You pilot no longer: ${reason}.`);
     const { version } = this;
     let state: GazeState | undefined;
@@ -195,7 +195,7 @@ export class GazePilot {
       return; // the refusal's own words have to do
     }
     if (version !== this.version) return; // something else was asked for meanwhile
-    if (state?.queue.some((one) => one.sessionId === sessionId)) {
+    if (state?.queue.some((one) => one.participantId === me)) {
       this.lost = '';
       await this.begin(); // in vain: then the reason is the one that ended it
     } else if (state?.lastHandover) {

@@ -75,6 +75,11 @@ export class Session {
     this.name = options.name;
   }
 
+  /** What others know this page by: as pilot, and in presence. */
+  get participantId(): string {
+    return this.joined?.participantId ?? '';
+  }
+
   get sessionId(): string {
     return this.joined?.sessionId ?? '';
   }

@@ -95,7 +95,7 @@ export interface PendingAnnotation {
 }
 
 export interface Participant {
-  readonly sessionId: string;
+  readonly participantId: string;
   readonly name: string;
   readonly role: Role;
 }

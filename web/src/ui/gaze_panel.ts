@@ -77,7 +77,7 @@ export class GazePanel {
     this.element.dataset['arrived'] = String(gaze?.arrived ?? false);
     this.dial.update(gaze?.angles);
     setText(this.angles, gaze?.angles ? directionWords(gaze.angles) : '');
-    const { sessionId: me, participants } = session;
+    const { participantId: me, participants } = session;
     const steering = hasHead(gaze)
       ? steerWords({ gaze, lease: pilot.lease, me, participants })
       : '';
@@ -88,7 +88,7 @@ export class GazePanel {
 
   private updateButtons(): void {
     const { pilot, session } = this;
-    const waits = session.gaze?.pilot && session.gaze.pilot.sessionId !== session.sessionId;
+    const waits = session.gaze?.pilot && session.gaze.pilot.participantId !== session.participantId;
     const label = { none: waits ? 'Queue' : 'Pilot', waiting: 'Leave', held: 'Release' };
     setText(this.leaseLabel, label[pilot.lease.kind]);
     const fast = this.buttons.get('fast');

@@ -154,17 +154,17 @@ export interface SteerInput {
 export function steerWords({ gaze, lease, me, participants }: SteerInput): string {
   const { pilot, queue, paused } = gaze;
   const wearer = participants.some(
-    (one) => one.sessionId === pilot?.sessionId && one.role === 'wearer',
+    (one) => one.participantId === pilot?.participantId && one.role === 'wearer',
   );
   const parts: string[] = [];
   if (paused) parts.push('paused by the wearer');
   if (!pilot) parts.push('nobody pilots');
-  else if (pilot.sessionId === me) parts.push('you pilot');
+  else if (pilot.participantId === me) parts.push('you pilot');
   else parts.push(wearer ? 'the wearer has taken over' : `${pilot.name} pilots`);
-  const place = queue.findIndex(({ sessionId }) => sessionId === me) + 1;
+  const place = queue.findIndex(({ participantId }) => participantId === me) + 1;
   const mine = place > 0 ? place : lease.kind === 'waiting' ? lease.position : 0;
   if (mine > 0) parts.push(`you are ${ordinal(mine)} in the queue`);
-  const others = queue.filter(({ sessionId }) => sessionId !== me).map(({ name }) => name);
+  const others = queue.filter(({ participantId }) => participantId !== me).map(({ name }) => name);
   if (others.length > 0)
     parts.push(`${others.join(', ')} ${others.length === 1 ? 'waits' : 'wait'}`);
   return parts.join(' · ');
@@ -172,7 +172,7 @@ export function steerWords({ gaze, lease, me, participants }: SteerInput): strin
 
 /** A change of hands for everybody to read. */
 export function handoverWords(gaze: Gaze, me: string): string {
-  const mine = gaze.pilot !== undefined && gaze.pilot.sessionId === me;
+  const mine = gaze.pilot !== undefined && gaze.pilot.participantId === me;
   const words = gaze.lastHandover;
   if (!words) return '';
   if (!mine) return `Camera: ${words}.`;

@@ -88,13 +88,13 @@ export class WearerApp {
   }
 }
 
-function watcherWords({ participants, gaze, sessionId }: Session): string {
+function watcherWords({ participants, gaze, participantId }: Session): string {
   const others = presenceWords(participants.filter(({ role }) => role !== 'wearer'));
   const watching = others ? `${others} watching` : 'nobody watches';
   if (!hasHead(gaze)) return watching;
   if (gaze.paused) return `${watching} · head stopped`;
   if (!gaze.pilot) return watching;
-  return `${watching} · ${gaze.pilot.sessionId === sessionId ? 'you pilot' : `${gaze.pilot.name} pilots`}`;
+  return `${watching} · ${gaze.pilot.participantId === participantId ? 'you pilot' : `${gaze.pilot.name} pilots`}`;
 }
 
 function noticeWords(player: Player, staleMs: number): string {

@@ -41,8 +41,8 @@ export class WearerHead {
   }
 
   private get mine(): boolean {
-    const { gaze, sessionId } = this.session;
-    return gaze?.pilot !== undefined && gaze.pilot.sessionId === sessionId;
+    const { gaze, participantId } = this.session;
+    return gaze?.pilot !== undefined && gaze.pilot.participantId === participantId;
   }
 
   update(): void {

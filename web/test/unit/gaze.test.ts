@@ -147,7 +147,7 @@ describe('GazePilot', () => {
     };
     const clients = { gaze } as unknown as Clients;
     const session = new Session(clients, { role: 'expert', view: 'raw', name: 'Ann' }, pictures);
-    session.joined = create(JoinResponseSchema, { sessionId: 's1' });
+    session.joined = create(JoinResponseSchema, { sessionId: 's1', participantId: 's1' });
     let tell: (told: LeaseTold) => void = () => undefined;
     const keep = (_session: string, told: (told: LeaseTold) => void) => {
       calls.push('keep');
@@ -209,8 +209,8 @@ describe('GazePilot', () => {
     const { pilot, calls, state, tell } = begin(mine);
     await pilot.acquire();
     const names = {
-      pilot: { sessionId: 'w', displayName: 'wearer' },
-      queue: [{ sessionId: 's1' }],
+      pilot: { participantId: 'w', displayName: 'wearer' },
+      queue: [{ participantId: 's1' }],
     };
     Object.assign(state, create(GazeStateSchema, names));
     tell({ kind: 'refused', reason: 'the lease has ended' });
@@ -226,7 +226,7 @@ describe('GazePilot', () => {
     await pilot.acquire();
     pilot.check();
     expect(pilot.holds).toBe(true);
-    session.joined = create(JoinResponseSchema, { sessionId: 's2' });
+    session.joined = create(JoinResponseSchema, { sessionId: 's2', participantId: 's2' });
     pilot.check();
     expect(pilot.lease.kind).toBe('none');
     expect(calls.slice(-2)).toEqual(['keep no more', 'release']);
@@ -237,7 +237,7 @@ describe('GazePilot', () => {
     await pilot.stop();
     expect(calls).toEqual(['keep', 'stop', 'keep no more', 'release']);
     session.gaze = toGaze(
-      create(GazeStateSchema, { pilot: { sessionId: 's9', displayName: 'Bob' } }),
+      create(GazeStateSchema, { pilot: { participantId: 's9', displayName: 'Bob' } }),
     );
     await expect(pilot.stop()).rejects.toThrow('only Bob or the wearer can stop it');
   });
@@ -314,10 +314,10 @@ describe('words of the gaze', () => {
   });
 
   it('say who pilots and who waits', () => {
-    const ann = { sessionId: 'a', displayName: 'Ann' };
-    const bob = { sessionId: 'b', displayName: 'Bob' };
+    const ann = { participantId: 'a', displayName: 'Ann' };
+    const bob = { participantId: 'b', displayName: 'Bob' };
     const gaze = gazeOf({ pilot: ann, queue: [bob], lastHandover: 'Bob released; Ann pilots' });
-    const participants = [{ sessionId: 'a', name: 'Ann', role: 'wearer' }] as const;
+    const participants = [{ participantId: 'a', name: 'Ann', role: 'wearer' }] as const;
     const lease = { kind: 'none' } as const;
     const say = (me: string, present: readonly (typeof participants)[number][] = []) =>
       steerWords({ gaze, lease, me, participants: present });
