@@ -19,6 +19,9 @@ AnchorManager::AnchorManager(AnchorOptions options, FrameLookup frames, SeedFeat
     : options_(std::move(options)),
       frames_(std::move(frames)),
       seed_(std::move(seed)),
+      histories_({.steps = options_.max_undo,
+                  .bytes_per_session = options_.max_undo_bytes,
+                  .bytes = options_.max_undo_bytes_all}),
       latest_(std::make_shared<const std::vector<Annotation>>()) {}
 
 void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
