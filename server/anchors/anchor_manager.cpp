@@ -38,6 +38,9 @@ void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
     record.stored_error_m = record.annotation.anchor.error_m;
     records_.push_back(std::move(record));
   }
+  std::stable_sort(records_.begin(), records_.end(), [](const auto& a, const auto& b) {
+    return CreatedBefore(a.annotation, b.annotation);
+  });
   Publish();
 }
 

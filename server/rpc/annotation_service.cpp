@@ -1,5 +1,6 @@
 #include "server/rpc/annotation_service.hpp"
 
+#include "server/rpc/annotation_pages.hpp"
 #include "server/rpc/status.hpp"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/to_proto.hpp"
@@ -114,14 +115,13 @@ grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext*
 }
 
 grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* context,
-                                                  const v1::ListAnnotationsRequest* /*request*/,
+                                                  const v1::ListAnnotationsRequest* request,
                                                   v1::ListAnnotationsResponse* response) {
-  // Not those of the newest frame: an edit that was answered is here at once.
-  for (const Annotation& annotation : *backend_.annotations()) {
-    *response->add_annotations() = wire::ToProto(annotation);
-  }
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(grpc::Status::OK);
+  // Not those of the newest frame: an edit that was answered is here at once. Held: the list is
+  // replaced by every frame and edit meanwhile.
+  const std::shared_ptr<const AnnotationList> annotations = backend_.annotations();
+  reactor->Finish(ToGrpc(ListPage(*annotations, *request, *response)));
   return reactor;
 }
 
