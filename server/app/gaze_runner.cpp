@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/anchors/edit_checks.hpp"
+#include "server/pipeline/busy.hpp"
 
 namespace saccade {
 namespace {
@@ -50,7 +51,7 @@ absl::Status GazeRunner::Submit(GazeCommand command) {
     const std::lock_guard lock(mutex_);
     if (stopped_) return absl::UnavailableError("the server is shutting down");
     if (commands_.size() >= mailbox_) {
-      return absl::ResourceExhaustedError("too many gaze commands are waiting: try again shortly");
+      return BusyError("too many gaze commands are waiting", 200'000'000);
     }
     commands_.push_back({MonotonicNow(), std::move(command)});
   }

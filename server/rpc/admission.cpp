@@ -1,0 +1,45 @@
+#include "server/rpc/admission.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include "server/pipeline/busy.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr const char* kWhat[kTolls] = {"joins",  "edits",         "resets of the map",
+                                       "stills", "gaze commands", "questions"};
+
+absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const char* whose) {
+  if (!wait_ns) return absl::OkStatus();
+  return BusyError(absl::StrCat("too many ", kWhat[static_cast<int>(toll)], whose), *wait_ns);
+}
+
+}  // namespace
+
+const RpcLimits::Kind& RpcLimits::of(Toll toll) const {
+  const Kind* const kinds[kTolls] = {&join, &edit, &reset, &still, &gaze, &read};
+  return *kinds[static_cast<int>(toll)];
+}
+
+Admission::Admission(const RpcLimits& limits) {
+  for (int toll = 0; toll < kTolls; ++toll) {
+    limiters_[static_cast<std::size_t>(toll)] =
+        std::make_unique<Limiters>(limits.of(static_cast<Toll>(toll)));
+  }
+}
+
+absl::Status Admission::Peer(Toll toll, const std::string& peer, Timestamp now_ns) {
+  Limiters& limiters = *limiters_[static_cast<std::size_t>(toll)];
+  // The peer's own first: who floods uses up his share, not everybody's.
+  absl::Status status = Judge(limiters.peer.Take(peer, now_ns), toll, " from this address");
+  if (!status.ok()) return status;
+  return Judge(limiters.server.Take("", now_ns), toll, "");
+}
+
+absl::Status Admission::Session(Toll toll, const std::string& participant_id, Timestamp now_ns) {
+  Limiters& limiters = *limiters_[static_cast<std::size_t>(toll)];
+  return Judge(limiters.session.Take(participant_id, now_ns), toll, " from this session");
+}
+
+}  // namespace saccade
