@@ -25,6 +25,15 @@ GazeRunner::GazeRunner(std::shared_ptr<Mount> mount, const GazeOptions& options,
     const std::lock_guard lock(mutex_);
     newest_ = state;
   });
+  loop_.SetPresence([this](const std::string& participant_id) {
+    const std::lock_guard lock(mutex_);
+    return present_ != nullptr && present_->contains(participant_id);
+  });
+}
+
+void GazeRunner::SetPresence(std::shared_ptr<const absl::flat_hash_set<std::string>> present) {
+  const std::lock_guard lock(mutex_);
+  present_ = std::move(present);
 }
 
 void GazeRunner::Start() {

@@ -9,8 +9,8 @@
 
 namespace saccade {
 
-/// ResourceExhausted that passes by itself: `message`, then "try again in ... s". Clients of the API
-/// read the time from google.rpc.RetryInfo, which the status carries as a payload.
+/// ResourceExhausted that passes by itself: `message`, then "try again in ... s". Clients of the
+/// API read the time from google.rpc.RetryInfo, which the status carries as a payload.
 absl::Status BusyError(absl::string_view message, Timestamp retry_after_ns);
 
 /// The google.rpc.RetryInfo of such a status, encoded; nothing in any other.

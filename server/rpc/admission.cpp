@@ -7,8 +7,8 @@
 namespace saccade {
 namespace {
 
-constexpr const char* kWhat[kTolls] = {"joins",  "edits",         "resets of the map",
-                                       "stills", "gaze commands", "questions"};
+constexpr const char* kWhat[kTolls] = {"joins",  "streams opened", "edits",    "resets of the map",
+                                       "stills", "gaze commands",  "questions"};
 
 absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const char* whose) {
   if (!wait_ns) return absl::OkStatus();
@@ -18,7 +18,7 @@ absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const cha
 }  // namespace
 
 const RpcLimits::Kind& RpcLimits::of(Toll toll) const {
-  const Kind* const kinds[kTolls] = {&join, &edit, &reset, &still, &gaze, &read};
+  const Kind* const kinds[kTolls] = {&join, &subscribe, &edit, &reset, &still, &gaze, &read};
   return *kinds[static_cast<int>(toll)];
 }
 
@@ -29,17 +29,23 @@ Admission::Admission(const RpcLimits& limits) {
   }
 }
 
-absl::Status Admission::Peer(Toll toll, const std::string& peer, Timestamp now_ns) {
-  Limiters& limiters = *limiters_[static_cast<std::size_t>(toll)];
+absl::Status Admission::Anyone(Toll toll, const std::string& peer, Timestamp now_ns) {
   // The peer's own first: who floods uses up his share, not everybody's.
-  absl::Status status = Judge(limiters.peer.Take(peer, now_ns), toll, " from this address");
+  absl::Status status = Judge(Of(toll).peer.Take(peer, now_ns), toll, " from this address");
   if (!status.ok()) return status;
-  return Judge(limiters.server.Take("", now_ns), toll, "");
+  return Judge(Of(toll).server.Take("", now_ns), toll, "");
 }
 
-absl::Status Admission::Session(Toll toll, const std::string& participant_id, Timestamp now_ns) {
-  Limiters& limiters = *limiters_[static_cast<std::size_t>(toll)];
-  return Judge(limiters.session.Take(participant_id, now_ns), toll, " from this session");
+absl::Status Admission::Participant(Toll toll, const std::string& participant_id,
+                                    const std::string& peer, Timestamp now_ns) {
+  Limiters& limiters = Of(toll);
+  if (limiters.has_courtesy && !limiters.courtesy.Take(participant_id, now_ns)) {
+    return absl::OkStatus();
+  }
+  absl::Status status =
+      Judge(limiters.session.Take(participant_id, now_ns), toll, " from this session");
+  if (!status.ok()) return status;
+  return Anyone(toll, peer, now_ns);
 }
 
 }  // namespace saccade

@@ -21,7 +21,8 @@ std::string Address(const std::string& address) {
     return absl::StrCat("ipv4:", address);
   }
   std::string network = "ipv6:";
-  for (std::size_t i = 0; i < 8; ++i) absl::StrAppend(&network, absl::Hex(bytes[i], absl::kZeroPad2));
+  for (std::size_t i = 0; i < 8; ++i)
+    absl::StrAppend(&network, absl::Hex(bytes[i], absl::kZeroPad2));
   return network;
 }
 
@@ -47,27 +48,29 @@ std::string PeerOf(const grpc::CallbackServerContext& context) {
 }
 
 absl::Status Gatekeeper::Anyone(const Context& context, Toll toll) {
-  return admission_.Peer(toll, PeerOf(context), MonotonicNow());
+  return admission_.Anyone(toll, PeerOf(context), MonotonicNow());
+}
+
+absl::StatusOr<Session> Gatekeeper::Admit(const Context& context, Toll toll,
+                                          absl::StatusOr<Session> session) {
+  const std::string peer = PeerOf(context);
+  const Timestamp now_ns = MonotonicNow();
+  // Who guesses at sessions is a stranger as well.
+  const absl::Status often =
+      session.ok() ? admission_.Participant(toll, session->participant_id, peer, now_ns)
+                   : admission_.Anyone(Toll::kRead, peer, now_ns);
+  if (!often.ok()) return often;
+  return session;
 }
 
 absl::StatusOr<Session> Gatekeeper::Member(const Context& context, Toll toll,
                                            const std::string& session_id) {
-  if (absl::Status peer = Anyone(context, toll); !peer.ok()) return peer;
-  absl::StatusOr<Session> session = sessions_.Find(session_id);
-  if (!session.ok()) return session;
-  absl::Status often = admission_.Session(toll, session->participant_id, MonotonicNow());
-  if (!often.ok()) return often;
-  return session;
+  return Admit(context, toll, sessions_.Find(session_id));
 }
 
 absl::StatusOr<Session> Gatekeeper::Editor(const Context& context, Toll toll,
                                            const std::string& session_id) {
-  if (absl::Status peer = Anyone(context, toll); !peer.ok()) return peer;
-  absl::StatusOr<Session> session = sessions_.FindEditor(session_id);
-  if (!session.ok()) return session;
-  absl::Status often = admission_.Session(toll, session->participant_id, MonotonicNow());
-  if (!often.ok()) return often;
-  return session;
+  return Admit(context, toll, sessions_.FindEditor(session_id));
 }
 
 }  // namespace saccade

@@ -31,6 +31,8 @@ class Gatekeeper {
   SessionTable& sessions() { return sessions_; }
 
  private:
+  absl::StatusOr<Session> Admit(const Context& context, Toll toll, absl::StatusOr<Session> session);
+
   SessionTable& sessions_;
   Admission admission_;
 };

@@ -27,16 +27,16 @@ struct SessionTableOptions {
   std::size_t max_sessions = 1000;
   // Where the table is full, these make room, and only these: who works is never put out by who
   // joins.
-  Timestamp unused_ns = 5'000'000'000;     // joined so long ago, and never heard of again
-  Timestamp idle_ns = 600'000'000'000;     // without a stream, and silent for so long
+  Timestamp unused_ns = 5'000'000'000;  // joined so long ago, and never heard of again
+  Timestamp idle_ns = 600'000'000'000;  // without a stream, and silent for so long
 };
 
 /// Who joined. Bounded. Thread safe.
 class SessionTable {
  public:
   /// Told the participant_id of each session that goes and was used, so that what is kept for it
-  /// elsewhere goes too; false: not now, and it is told again with the next one. Called from Join();
-  /// must not block or call back.
+  /// elsewhere goes too; false: not now, and it is told again with the next one. Called from
+  /// Join(); must not block or call back.
   using OnGone = std::function<bool(const std::string& participant_id)>;
 
   explicit SessionTable(const SessionTableOptions& options = {}, OnGone on_gone = nullptr)
