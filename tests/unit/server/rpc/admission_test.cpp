@@ -22,7 +22,7 @@ TEST(RateLimiter, GivesABurstThenItsRateAndSaysHowLongToWait) {
   EXPECT_FALSE(limiter.Take("a", *wait_ns + 1).has_value());
   EXPECT_FALSE(limiter.Take("b", 0).has_value()) << "another key has its own";
   int granted = 0;
-  for (int ms = 0; ms < 10'000; ++ms) {
+  for (Timestamp ms = 0; ms < 10'000; ++ms) {
     granted += !limiter.Take("a", kSecond + ms * 1'000'000).has_value();
   }
   EXPECT_NEAR(granted, 105, 2);
