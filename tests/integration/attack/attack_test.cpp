@@ -17,7 +17,7 @@ void AttackTest::Begin(const TargetOptions& options) {
   target_ = std::make_unique<Target>(options);
   expert_ = std::make_unique<GoodExpert>(*target_);
   ASSERT_GT(expert_->received().poses, 0) << "no pose came to the good expert";
-  expert_->PlaceMarks(kMarks, milliseconds(200));
+  expert_->PlaceMarks(kMarks, milliseconds(100));
 }
 
 void AttackTest::TearDown() {
@@ -43,7 +43,7 @@ void AttackTest::Run(milliseconds span, const std::function<void(const Battle&)>
 
 void AttackTest::SendAll(const std::vector<HttpCase>& cases) {
   for (const HttpCase& one : cases) {
-    const std::string answer = AnswerTo(target_->http_port(), one.bytes, milliseconds(500));
+    const std::string answer = AnswerTo(target_->http_port(), one.bytes, milliseconds(300));
     tally_.Add(answer);
     // A server that falls takes a moment to be gone.
     if (answer == "closed") std::this_thread::sleep_for(milliseconds(20));

@@ -55,7 +55,8 @@ void FuzzMethods(const Battle& battle);
 /// Header-like bytes without an end, each kind once: `megabytes` altogether unless it is hung up
 /// on.
 void SendEndlessHttp(const Battle& battle, int megabytes);
-void ListWhileOthersEdit(const Battle& battle, int annotations);
+/// Fills first, then lists and edits for `race`.
+void ListWhileOthersEdit(const Battle& battle, int annotations, milliseconds race);
 void LeaveGhosts(const Battle& battle, long most = 1'000'000);
 void UseUpDescriptors(const Battle& battle, int connections, milliseconds hold);
 void HoldStreams(const Battle& battle, int streams);

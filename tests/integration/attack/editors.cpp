@@ -88,7 +88,7 @@ void Battle::Rest(milliseconds pause) const {
 
 void GiveWay() { setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10); }
 
-void ListWhileOthersEdit(const Battle& battle, int annotations) {
+void ListWhileOthersEdit(const Battle& battle, int annotations, milliseconds race) {
   constexpr int kEach = 4;
   {
     std::vector<std::jthread> fillers;
@@ -96,10 +96,12 @@ void ListWhileOthersEdit(const Battle& battle, int annotations) {
       fillers.emplace_back([&] { Fill(battle, annotations / kEach); });
     }
   }
+  const Battle racing{battle.target, battle.seed, std::min(battle.end, Clock::now() + race),
+                      battle.tally};
   std::vector<std::jthread> threads;
   for (int i = 0; i < kEach; ++i) {
-    threads.emplace_back([&] { List(battle); });
-    threads.emplace_back([&] { Edit(battle); });
+    threads.emplace_back([&] { List(racing); });
+    threads.emplace_back([&] { Edit(racing); });
   }
 }
 

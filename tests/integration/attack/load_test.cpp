@@ -15,10 +15,7 @@ using Load = AttackTest;
 constexpr double kShare = 0.8;
 
 TEST_F(Load, ListsBesideEditsSeeWholeAnnotations) {
-  Run(seconds(25), [](const Battle& battle) {
-    // The half that is left after filling is for the race.
-    ListWhileOthersEdit(battle, 600);
-  });
+  Run(seconds(30), [](const Battle& battle) { ListWhileOthersEdit(battle, 600, seconds(4)); });
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();
   EXPECT_GE(tally_.of("annotations"), 500);
   EXPECT_GT(tally_.of("lists"), 100);
@@ -35,7 +32,7 @@ TEST_F(Load, HeldStreamsCostNoThreadEach) {
       std::this_thread::sleep_for(milliseconds(50));
     }
   });
-  Run(seconds(4), [](const Battle& battle) { HoldStreams(battle, 600); });
+  Run(seconds(3), [](const Battle& battle) { HoldStreams(battle, 600); });
   watch.request_stop();
   watch.join();
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();

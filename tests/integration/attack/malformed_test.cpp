@@ -19,14 +19,14 @@ TEST_F(Malformed, Http2IsRefused) {
     Socket socket(target_->grpc_port());
     ASSERT_TRUE(socket.ok()) << one.name;
     socket.Send(one.bytes, seconds(2));
-    tally_.Add(socket.ClosedByPeer(milliseconds(200)) ? "closed" : "held");
+    tally_.Add(socket.ClosedByPeer(milliseconds(60)) ? "closed" : "held");
     ASSERT_TRUE(target_->Alive()) << one.name << ": " << target_->Obituary();
   }
 }
 
 TEST_F(Malformed, MessagesFromDescriptorsEndNothing) {
   ASSERT_GE(MethodNames().size(), 30u);
-  Run(seconds(8), FuzzMethods);
+  Run(seconds(6), FuzzMethods);
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();
   DeleteStrangersAnnotations(*target_);
 }
@@ -69,7 +69,7 @@ TEST_F(Malformed, AThousandRequestsAtOnceAreAnsweredInTurn) {
 }
 
 TEST_F(Malformed, ByteByByteHoldsNobodyUp) {
-  Run(seconds(5), [](const Battle& battle) { DripBytes(battle, 100, milliseconds(50)); });
+  Run(seconds(3), [](const Battle& battle) { DripBytes(battle, 100, milliseconds(50)); });
 }
 
 }  // namespace

@@ -1,4 +1,7 @@
 // Everything at once, while the good expert works.
+#include <absl/strings/str_split.h>
+
+#include <algorithm>
 #include <cstdlib>
 #include <iostream>
 #include <thread>
@@ -19,6 +22,50 @@ seconds Length() {
   return seconds(text != nullptr ? std::atoi(text) : kDefaultSeconds);
 }
 
+struct Named {
+  std::string name;
+  std::function<void(const Battle&)> run;
+};
+
+std::vector<Named> Attacks() {
+  return {
+      {"http", SendMalformedHttp},
+      {"http2", SendMalformedHttp2},
+      {"fuzz", FuzzMethods},
+      {"ghosts", [](const Battle& battle) { LeaveGhosts(battle); }},
+      {"endless",
+       [](const Battle& battle) {
+         for (; !battle.over(); battle.Rest(seconds(2))) SendEndlessHttp(battle, 40);
+       }},
+      {"lists",
+       [](const Battle& battle) {
+         while (!battle.over()) ListWhileOthersEdit(battle, 20, seconds(5));
+       }},
+      {"streams", [](const Battle& battle) { HoldStreams(battle, 300); }},
+      {"slow", [](const Battle& battle) { ReadSlowly(battle, 20); }},
+      {"drip", [](const Battle& battle) { DripBytes(battle, 50, milliseconds(200)); }},
+      {"descriptors", [](const Battle& battle) { UseUpDescriptors(battle, 1200, seconds(5)); }},
+      {"joins", [](const Battle& battle) { Flood(battle, {JoinCall()}, 500); }},
+      {"costly",
+       [](const Battle& battle) {
+         const auto channel = battle.target.NewChannel();
+         Flood(battle, CostlyCalls(JoinSession(channel, 1, seconds(10))), 300);
+       }},
+  };
+}
+
+// All, or those that SACCADE_ATTACK_ONLY names ("ghosts,fuzz"): to find which one it was.
+std::vector<Named> Wanted() {
+  std::vector<Named> attacks = Attacks();
+  if (const char* only = std::getenv("SACCADE_ATTACK_ONLY"); only != nullptr) {
+    const std::vector<std::string> names = absl::StrSplit(only, ',');
+    std::erase_if(attacks, [&](const Named& one) {
+      return std::find(names.begin(), names.end(), one.name) == names.end();
+    });
+  }
+  return attacks;
+}
+
 void Note(const char* when, const Vitals& vitals, int participants) {
   std::cout << "note: " << when << ": " << vitals.rss_kib / 1024 << " MiB, " << vitals.descriptors
             << " descriptors, " << vitals.threads << " threads, " << participants
@@ -29,32 +76,14 @@ TEST_F(Siege, TheExpertLosesNothingAndTheServerIsAsBefore) {
   std::this_thread::sleep_for(seconds(2));
   const Vitals before = target_->vitals();
   Note("before", before, Participants());
-  const std::vector<std::function<void(const Battle&)>> attacks = {
-      SendMalformedHttp,
-      SendMalformedHttp2,
-      FuzzMethods,
-      [](const Battle& battle) { LeaveGhosts(battle); },
-      [](const Battle& battle) {
-        while (!battle.over()) SendEndlessHttp(battle, 40), battle.Rest(seconds(2));
-      },
-      [](const Battle& battle) { ListWhileOthersEdit(battle, 100); },
-      [](const Battle& battle) { HoldStreams(battle, 300); },
-      [](const Battle& battle) { ReadSlowly(battle, 20); },
-      [](const Battle& battle) { DripBytes(battle, 50, milliseconds(200)); },
-      [](const Battle& battle) { UseUpDescriptors(battle, 1200, seconds(5)); },
-      [](const Battle& battle) { Flood(battle, {JoinCall()}, 500); },
-      [](const Battle& battle) {
-        const auto channel = battle.target.NewChannel();
-        Flood(battle, CostlyCalls(JoinSession(channel, 1, seconds(10))), 300);
-      },
-  };
+  const std::vector<Named> attacks = Wanted();
   PeakMemory peak(target_->pid());
   Run(Length(), [&](const Battle& battle) {
     std::vector<std::jthread> threads;
-    for (const auto& attack : attacks) {
+    for (const Named& attack : attacks) {
       threads.emplace_back([&attack, &battle] {
         GiveWay();
-        attack(battle);
+        attack.run(battle);
       });
     }
   });

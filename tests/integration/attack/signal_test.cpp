@@ -39,7 +39,10 @@ void PlaceThree(const std::string& data_dir) {
   for (int i = 0; i < 3; ++i) {
     request.set_request_id("0e4a7f6a-52a1-4a55-8f0f-00000000000" + std::to_string(i));
     v1::CreateAnnotationResponse response;
-    const RawReply reply = Ask(channel, "AnnotationService/Create", request, response);
+    RawReply reply;
+    do {  // until the first frame is tracked
+      reply = Ask(channel, "AnnotationService/Create", request, response);
+    } while (reply.Is(grpc::StatusCode::FAILED_PRECONDITION));
     ASSERT_TRUE(reply.status.ok()) << reply.status.error_message();
   }
   target.process().Signal(SIGTERM);
@@ -50,17 +53,22 @@ milliseconds SinceIn(Clock::time_point from) {
   return std::chrono::duration_cast<milliseconds>(Clock::now() - from);
 }
 
-// One life: start, wait, signal, end. Exit code 0; 128 + n only before the server hears signals,
-// that is before it is ready.
-void LiveAndDie(const std::string& data_dir, milliseconds wait, int signal, Tally& tally) {
+// One life: start, wait (from the start, or from when it is ready), signal, end. Exit code 0;
+// 128 + n only before the server hears signals, that is before it is ready.
+void LiveAndDie(const std::string& data_dir, bool from_ready, milliseconds wait, int signal,
+                Tally& tally) {
   Process process(LimitedServer({}, data_dir));
+  if (from_ready) {
+    ASSERT_TRUE(process.WaitForLine("\"ready\"", seconds(30)).has_value()) << process.err();
+  }
   std::this_thread::sleep_for(wait);
   const bool ready = process.WaitForLine("\"ready\"", milliseconds(0)).has_value();
   const auto from = Clock::now();
   process.Signal(signal);
   const std::optional<int> code = process.Wait(kEnd + kSlack);
-  const std::string when = std::to_string(wait.count()) + " ms after the start, " +
-                           (ready ? "ready" : "not ready") + ", signal " + std::to_string(signal);
+  const std::string when = std::to_string(wait.count()) + " ms after the start" +
+                           (from_ready ? " of service" : "") + (ready ? ", ready" : ", not ready") +
+                           ", signal " + std::to_string(signal);
   tally.Add(ready ? "signals when ready" : "signals before");
   if (!code) {
     ADD_FAILURE() << "still there " << SinceIn(from).count() << " ms after a signal: " << when;
@@ -83,8 +91,10 @@ TEST(Signals, EndItAtFiftyRandomMoments) {
       PlaceThree(folder / "data");
       std::mt19937 random(kSeed + static_cast<unsigned>(w));
       for (int i = 0; i < kSignals / kWorkers; ++i) {
-        const milliseconds wait(std::uniform_int_distribution<int>(0, 800)(random));
-        LiveAndDie(folder / "data", wait, random() % 2 == 0 ? SIGTERM : SIGINT, tally);
+        const bool from_ready = i % 3 == 2;
+        const milliseconds wait(
+            std::uniform_int_distribution<int>(0, from_ready ? 200 : 800)(random));
+        LiveAndDie(folder / "data", from_ready, wait, random() % 2 == 0 ? SIGTERM : SIGINT, tally);
       }
       TargetOptions options;
       options.data_dir = folder / "data";

@@ -71,7 +71,8 @@ std::string Socket::Receive(milliseconds limit, std::string_view until, std::siz
   std::string received;
   while (ok() && received.size() < max_bytes) {
     char buffer[16384];
-    const ssize_t count = recv(fd_, buffer, sizeof buffer, 0);
+    const std::size_t wanted = std::min(sizeof buffer, max_bytes - received.size());
+    const ssize_t count = recv(fd_, buffer, wanted, 0);
     if (count > 0) {
       received.append(buffer, static_cast<std::size_t>(count));
       if (!until.empty() && received.find(until) != std::string::npos) break;
