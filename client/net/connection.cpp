@@ -5,6 +5,7 @@
 #include <absl/strings/str_format.h>
 #include <grpcpp/grpcpp.h>
 
+#include <iterator>
 #include <random>
 #include <utility>
 
@@ -160,10 +161,12 @@ class Connection::Impl {
     const std::unique_ptr<grpc::ClientReader<v1::Event>> reader =
         session_->Subscribe(&context, request);
     v1::Event message;
+    KnownStrokes strokes;
     absl::Status failure;
     bool more = true;
     while (more && reader->Read(&message)) {
       if (message.sequence() % kAcknowledgeEvery == 0) Acknowledge(message.sequence());
+      if (message.has_annotation()) strokes.Complete(*message.mutable_annotation());
       absl::StatusOr<std::optional<WatchEvent>> event = FromProto(message);
       if (!event.ok()) failure = event.status();
       more = event.ok() && (!event->has_value() || on_event(**event));
@@ -259,10 +262,17 @@ absl::StatusOr<Annotation> Connection::UpdateAnnotation(const AnnotationPatch& p
 }
 
 absl::StatusOr<std::vector<Annotation>> Connection::ListAnnotations() {
-  auto response = impl_->Call(*impl_->annotation_, &v1::AnnotationService::Stub::List,
-                              v1::ListAnnotationsRequest());
-  if (!response.ok()) return response.status();
-  return FromProto(response->annotations());
+  std::vector<Annotation> all;
+  v1::ListAnnotationsRequest request;
+  do {
+    auto response = impl_->Call(*impl_->annotation_, &v1::AnnotationService::Stub::List, request);
+    if (!response.ok()) return response.status();
+    absl::StatusOr<std::vector<Annotation>> page = FromProto(response->annotations());
+    if (!page.ok()) return page.status();
+    std::move(page->begin(), page->end(), std::back_inserter(all));
+    request.set_page_token(response->next_page_token());
+  } while (!request.page_token().empty());
+  return all;
 }
 
 absl::Status Connection::DeleteAnnotation(const std::string& id) {

@@ -142,6 +142,21 @@ absl::StatusOr<AnnotationChange> FromProto(const v1::AnnotationEvent& message) {
       .removed_ids = {message.removed_ids().begin(), message.removed_ids().end()}};
 }
 
+void KnownStrokes::Complete(v1::AnnotationEvent& event) {
+  if (event.full()) known_.clear();
+  for (const std::string& id : event.removed_ids()) known_.erase(id);
+  for (const v1::Annotation& annotation : event.upserted()) {
+    if (annotation.ink_offset_m_size() > 0) known_[annotation.id()] = annotation;
+  }
+  for (v1::AnchorUpdate& update : *event.mutable_anchors()) {
+    const auto known = known_.find(update.id());
+    if (known == known_.end()) continue;
+    *known->second.mutable_anchor() = update.anchor();
+    *event.add_upserted() = known->second;
+  }
+  event.clear_anchors();
+}
+
 absl::StatusOr<std::optional<WatchEvent>> FromProto(const v1::Event& message) {
   switch (message.event_case()) {
     case v1::Event::kPose: {

@@ -7,6 +7,7 @@
 
 #include "server/anchors/anchor_manager.hpp"
 #include "server/anchors/edit_checks.hpp"
+#include "server/anchors/quota.hpp"
 
 namespace saccade {
 namespace {
@@ -19,12 +20,6 @@ std::int64_t UnixNow() {
 
 RecordPtr Copy(const AnchorRecord* record) {
   return record ? std::make_shared<const AnchorRecord>(*record) : nullptr;
-}
-
-/// Whether `live` is still what `expected` left (both null: it does not exist).
-bool IsUnchanged(const AnchorRecord* live, const RecordPtr& expected) {
-  if (!live || !expected) return !live && !expected;
-  return live->content_id == expected->content_id;
 }
 
 }  // namespace
@@ -86,10 +81,11 @@ absl::Status AnchorManager::Place(const AnnotationTarget& target,
 absl::StatusOr<AnnotationEdit> AnchorManager::Create(const AnnotationDraft& draft,
                                                      const std::string& session_id) {
   if (absl::Status status = CheckDraft(draft); !status.ok()) return status;
-  if (records_.size() >= options_.max_annotations) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "there are ", records_.size(), " annotations, as many as are kept; delete some first"));
-  }
+  const Holding added{
+      1, draft.ink_px.size(),
+      draft.text.size() + draft.author.size() + draft.ink_px.size() * sizeof(Eigen::Vector3d)};
+  absl::Status fits = CheckQuotas(records_, options_, session_id, added);
+  if (!fits.ok()) return fits;
   AnchorRecord record;
   record.annotation.id = MakeUuid();
   record.annotation.shape = draft.shape;
@@ -100,11 +96,11 @@ absl::StatusOr<AnnotationEdit> AnchorManager::Create(const AnnotationDraft& draf
   record.annotation.created_unix_ns = UnixNow();
   record.annotation.revision = 1;
   if (absl::Status status = Place(draft.target, draft.ink_px, record); !status.ok()) return status;
+  record.owner = session_id;
   record.content_id = next_content_++;
-  EditStep step{record.annotation.id, nullptr, Copy(&record),
-                "created " + ShortName(record.annotation)};
-  absl::StatusOr<AnnotationEdit> edit = Apply(EditKind::kCreate, session_id, std::move(step));
-  if (edit.ok()) edit->change.request_id = draft.request_id;
+  AnnotationEdit edit =
+      Apply(EditKind::kCreate, session_id, nullptr, &record, /*touches_place=*/true, "created");
+  edit.change.request_id = draft.request_id;
   return edit;
 }
 
@@ -120,14 +116,14 @@ absl::StatusOr<AnnotationEdit> AnchorManager::Update(const AnnotationPatch& patc
   if (patch.text) record.annotation.text = *patch.text;
   if (patch.size_m) record.annotation.size_m = *patch.size_m;
   if (patch.color_rgba) record.annotation.color_rgba = *patch.color_rgba;
+  if (absl::Status fits = CheckGrowth(live, record.annotation, session_id); !fits.ok()) return fits;
   if (patch.target) {
     if (absl::Status status = Place(*patch.target, {}, record); !status.ok()) return status;
   }
   record.annotation.revision += 1;
   record.content_id = next_content_++;
-  EditStep step{patch.id, Copy(live), Copy(&record),
-                (patch.target ? "moved " : "changed ") + ShortName(record.annotation)};
-  return Apply(EditKind::kUpdate, session_id, std::move(step));
+  return Apply(EditKind::kUpdate, session_id, live, &record,
+               /*touches_place=*/patch.target.has_value(), patch.target ? "moved" : "changed");
 }
 
 absl::StatusOr<AnnotationEdit> AnchorManager::Delete(const std::string& id,
@@ -137,80 +133,119 @@ absl::StatusOr<AnnotationEdit> AnchorManager::Delete(const std::string& id,
     return absl::NotFoundError(
         absl::StrCat("id '", id, "' is no annotation; list them to see which there are"));
   }
-  EditStep step{id, Copy(live), nullptr, "deleted " + ShortName(live->annotation)};
-  return Apply(EditKind::kDelete, session_id, std::move(step));
+  return Apply(EditKind::kDelete, session_id, live, nullptr, /*touches_place=*/true, "deleted");
+}
+
+/// Whether `wanted` fits into the quotas in place of `live` (null: it is new).
+absl::Status AnchorManager::CheckGrowth(const AnchorRecord* live, const Annotation& wanted,
+                                        const std::string& owner) const {
+  Holding added = HoldingOf(wanted);
+  if (live) {
+    const Holding had = HoldingOf(live->annotation);
+    added.annotations -= had.annotations;
+    added.ink_points -= std::min(added.ink_points, had.ink_points);
+    added.bytes -= std::min(added.bytes, had.bytes);
+  }
+  return CheckQuotas(records_, options_, owner, added);
 }
 
 /// A new edit: remembered for undo, and what was undone before can no longer be redone.
-absl::StatusOr<AnnotationEdit> AnchorManager::Apply(EditKind kind, const std::string& session_id,
-                                                    EditStep step) {
-  EditHistory history = histories_[session_id];
+AnnotationEdit AnchorManager::Apply(EditKind kind, const std::string& session_id,
+                                    const AnchorRecord* before, const AnchorRecord* after,
+                                    bool touches_place, const std::string& verb) {
+  const Annotation& annotation = (after ? after : before)->annotation;
+  EditHistory history = histories_.Get(session_id);
+  auto step = std::make_shared<EditStep>();
+  step->id = annotation.id;
+  step->description = absl::StrCat(verb, " ", ShortName(annotation));
+  step->touches_place = touches_place;
+  step->number = next_step_++;
+  if (!touches_place) step->before = LastLeft(history, before);
+  if (!step->before) step->before = Past(before, touches_place);
+  step->after = Past(after, touches_place);
   history.undone.clear();
   history.done.push_back(step);
-  if (history.done.size() > options_.max_undo) history.done.erase(history.done.begin());
-  return Commit(kind, session_id, step, std::move(history), step.description);
+  return Commit(kind, session_id, step->id, after, std::move(history), step->description);
 }
 
-/// Makes `step.after` the live state.
-absl::StatusOr<AnnotationEdit> AnchorManager::Commit(EditKind kind, const std::string& session_id,
-                                                     const EditStep& step, EditHistory history,
-                                                     const std::string& description) {
-  const AnchorRecord* live = Find(step.id);
+/// Makes `after` (null: nothing) the live state of `id`.
+AnnotationEdit AnchorManager::Commit(EditKind kind, const std::string& session_id,
+                                     const std::string& id, const AnchorRecord* after,
+                                     EditHistory history, const std::string& description) {
+  const AnchorRecord* live = Find(id);
   AnnotationEdit edit;
-  edit.change = {next_sequence_++, kind, step.id, session_id, "", description, std::nullopt};
-  EditHistory& held = histories_[session_id];
-  pending_.push_back({edit.change.sequence, step.id, Copy(live), session_id, held});
-  held = std::move(history);
-  if (step.after) {
-    edit.annotation = step.after->annotation;
-    edit.change.after = StoredAnnotation{edit.annotation, step.after->place.world_key};
+  edit.change = {next_sequence_++, kind, id, session_id, "", description, std::nullopt};
+  pending_.push_back(
+      {edit.change.sequence, id, Copy(live), session_id, histories_.Get(session_id)});
+  histories_.Set(session_id, std::move(history));
+  if (after) {
+    edit.annotation = after->annotation;
+    edit.change.after = StoredAnnotation{edit.annotation, after->place.world_key};
   } else {
     edit.annotation = live->annotation;
     edit.annotation.anchor.state = AnchorState::kStopped;
     edit.annotation.anchor.reason = "deleted";
   }
-  Put(step.id, step.after);
+  Put(id, after);
   Publish();
   return edit;
 }
 
 absl::StatusOr<AnnotationEdit> AnchorManager::TakeBack(bool undo, const std::string& session_id) {
-  EditHistory history = histories_[session_id];
-  std::vector<EditStep>& from = undo ? history.done : history.undone;
-  std::vector<EditStep>& to = undo ? history.undone : history.done;
+  EditHistory history = histories_.Get(session_id);
+  std::vector<EditStepPtr>& from = undo ? history.done : history.undone;
+  std::vector<EditStepPtr>& to = undo ? history.undone : history.done;
   if (from.empty()) {
     return absl::FailedPreconditionError(undo ? "this session has nothing to undo"
                                               : "this session has nothing to redo");
   }
-  EditStep step = from.back();
+  const EditStepPtr step = from.back();
   from.pop_back();
-  const AnchorRecord* live = Find(step.id);
-  if (!IsUnchanged(live, undo ? step.after : step.before)) {
-    histories_[session_id] = std::move(history);
+  const AnchorRecord* live = Find(step->id);
+  if (!IsUnchanged(live, undo ? step->after : step->before)) {
+    histories_.Set(session_id, std::move(history));
     return absl::FailedPreconditionError(
-        absl::StrCat("somebody else changed it since you ", step.description,
+        absl::StrCat("somebody else changed it since you ", step->description,
                      "; that step is skipped, the one before it is next"));
   }
-  const RecordPtr& wanted = undo ? step.before : step.after;
-  EditStep apply{step.id, Copy(live), nullptr, ""};
+  const PastStatePtr& wanted = undo ? step->before : step->after;
+  std::optional<AnchorRecord> restored;
   if (wanted) {
-    AnchorRecord restored = *wanted;
-    if (live) {
-      restored.annotation.revision = live->annotation.revision;
-      if (live->place.id == restored.place.id) {  // the place was not part of the edit
-        restored.place = live->place;
-        restored.annotation.anchor = live->annotation.anchor;
-      }
-    }
-    restored.annotation.revision += 1;
-    if (newest_) Estimate(restored);
-    apply.after = Copy(&restored);
+    absl::Status fits =
+        CheckGrowth(live, wanted->annotation, wanted->owner == session_id ? session_id : "");
+    if (!fits.ok()) return fits;
+    restored = Restore(*wanted, live);
   }
-  (undo ? step.before : step.after) = apply.after;
-  (undo ? step.after : step.before) = apply.before;
-  to.push_back(step);
-  return Commit(undo ? EditKind::kUndo : EditKind::kRedo, session_id, apply, std::move(history),
-                absl::StrCat(undo ? "took back: " : "did again: ", step.description));
+  EditStepPtr turned = step;
+  if (step->touches_place) {  // places move on with the map: these are the ones to come back to
+    auto fresh = std::make_shared<EditStep>(*step);
+    (undo ? fresh->before : fresh->after) = Past(restored ? &*restored : nullptr, true);
+    (undo ? fresh->after : fresh->before) = Past(live, true);
+    turned = std::move(fresh);
+  }
+  to.push_back(std::move(turned));
+  return Commit(undo ? EditKind::kUndo : EditKind::kRedo, session_id, step->id,
+                restored ? &*restored : nullptr, std::move(history),
+                absl::StrCat(undo ? "took back: " : "did again: ", step->description));
+}
+
+/// `past` as a live record, in place of `live` (null: it does not exist any more).
+AnchorRecord AnchorManager::Restore(const PastState& past, const AnchorRecord* live) const {
+  AnchorRecord record = live ? *live : AnchorRecord{};
+  const Anchor anchor = record.annotation.anchor;
+  const std::uint64_t revision = (live ? *live : record).annotation.revision;
+  record.annotation = past.annotation;
+  record.content_id = past.content_id;
+  record.owner = past.owner;
+  if (live) record.annotation.revision = revision;
+  record.annotation.revision += 1;
+  if (live && (!past.place || live->place.id == past.place->id)) {
+    record.annotation.anchor = anchor;  // the place was not part of the edit
+  } else if (past.place) {
+    record.place = *past.place;
+  }
+  if (newest_) Estimate(record);
+  return record;
 }
 
 absl::StatusOr<AnnotationEdit> AnchorManager::Undo(const std::string& session_id) {
@@ -221,21 +256,21 @@ absl::StatusOr<AnnotationEdit> AnchorManager::Redo(const std::string& session_id
   return TakeBack(false, session_id);
 }
 
-void AnchorManager::Put(const std::string& id, const RecordPtr& record) {
+void AnchorManager::Put(const std::string& id, const AnchorRecord* record) {
   AnchorRecord* live = Find(id);
   if (!record) {
     if (live) records_.erase(records_.begin() + (live - records_.data()));
   } else if (live) {
     *live = *record;
   } else {
-    const auto later = [&record](const AnchorRecord& other) {
-      return other.annotation.created_unix_ns > record->annotation.created_unix_ns;
+    const auto later = [record](const AnchorRecord& other) {
+      return CreatedBefore(record->annotation, other.annotation);
     };
     records_.insert(std::find_if(records_.begin(), records_.end(), later), *record);
   }
 }
 
-void AnchorManager::ForgetSession(const std::string& session_id) { histories_.erase(session_id); }
+void AnchorManager::ForgetSession(const std::string& session_id) { histories_.Forget(session_id); }
 
 void AnchorManager::Committed(std::uint64_t sequence) {
   while (!pending_.empty() && pending_.front().sequence <= sequence) pending_.pop_front();
@@ -244,8 +279,8 @@ void AnchorManager::Committed(std::uint64_t sequence) {
 void AnchorManager::RollBack(std::uint64_t sequence) {
   while (!pending_.empty() && pending_.back().sequence > sequence) {
     PendingEdit& edit = pending_.back();
-    Put(edit.id, edit.before);
-    histories_[edit.session_id] = std::move(edit.history_before);
+    Put(edit.id, edit.before.get());
+    histories_.Set(edit.session_id, std::move(edit.history_before));
     pending_.pop_back();
   }
   Publish();

@@ -19,6 +19,9 @@ AnchorManager::AnchorManager(AnchorOptions options, FrameLookup frames, SeedFeat
     : options_(std::move(options)),
       frames_(std::move(frames)),
       seed_(std::move(seed)),
+      histories_({.steps = options_.max_undo,
+                  .bytes_per_session = options_.max_undo_bytes,
+                  .bytes = options_.max_undo_bytes_all}),
       latest_(std::make_shared<const std::vector<Annotation>>()) {}
 
 void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
@@ -35,6 +38,9 @@ void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
     record.stored_error_m = record.annotation.anchor.error_m;
     records_.push_back(std::move(record));
   }
+  std::stable_sort(records_.begin(), records_.end(), [](const auto& a, const auto& b) {
+    return CreatedBefore(a.annotation, b.annotation);
+  });
   Publish();
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <absl/container/flat_hash_map.h>
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
@@ -57,7 +56,7 @@ class AnchorManager {
   ///   InvalidArgument     not finite, pixel outside the image, size or text out of range
   ///   NotFound            frame too old or unknown; unknown feature
   ///   FailedPrecondition  not tracking in that frame; map was reset since; no depth known yet
-  ///   ResourceExhausted   options.max_annotations reached
+  ///   ResourceExhausted   a quota of the options is reached; says which, and what to do
   absl::StatusOr<AnnotationEdit> Create(const AnnotationDraft& draft,
                                         const std::string& session_id);
   /// As Create; NotFound for an unknown id.
@@ -66,7 +65,8 @@ class AnchorManager {
   absl::StatusOr<AnnotationEdit> Delete(const std::string& id, const std::string& session_id);
 
   /// Takes back, or does again, the last change made by this session. FailedPrecondition if there
-  /// is none, or if somebody else changed that annotation since (that step is then dropped).
+  /// is none, or if somebody else changed that annotation since (that step is then dropped);
+  /// ResourceExhausted if what it brings back does not fit into the quotas now.
   absl::StatusOr<AnnotationEdit> Undo(const std::string& session_id);
   absl::StatusOr<AnnotationEdit> Redo(const std::string& session_id);
 
@@ -86,18 +86,25 @@ class AnchorManager {
   /// Takes back every change after `sequence`, newest first: the store could not keep them.
   void RollBack(std::uint64_t sequence);
 
+  /// Memory that undo holds, over all sessions [bytes].
+  std::size_t undo_bytes() const { return histories_.bytes(); }
+
   /// All annotations as of the last Resolve or edit, oldest first; never null. Any thread.
   std::shared_ptr<const std::vector<Annotation>> Latest() const;
 
  private:
-  absl::StatusOr<AnnotationEdit> Apply(EditKind kind, const std::string& session_id, EditStep step);
-  absl::StatusOr<AnnotationEdit> Commit(EditKind kind, const std::string& session_id,
-                                        const EditStep& step, EditHistory history,
-                                        const std::string& description);
+  AnnotationEdit Apply(EditKind kind, const std::string& session_id, const AnchorRecord* before,
+                       const AnchorRecord* after, bool touches_place, const std::string& verb);
+  AnnotationEdit Commit(EditKind kind, const std::string& session_id, const std::string& id,
+                        const AnchorRecord* after, EditHistory history,
+                        const std::string& description);
   absl::StatusOr<AnnotationEdit> TakeBack(bool undo, const std::string& session_id);
+  AnchorRecord Restore(const PastState& past, const AnchorRecord* live) const;
+  absl::Status CheckGrowth(const AnchorRecord* live, const Annotation& wanted,
+                           const std::string& owner) const;
   absl::Status Place(const AnnotationTarget& target, const std::vector<Eigen::Vector2d>& ink_px,
                      AnchorRecord& record);
-  void Put(const std::string& id, const RecordPtr& record);
+  void Put(const std::string& id, const AnchorRecord* record);
   AnchorRecord* Find(const std::string& id);
   absl::Status CheckReady() const;
   bool Attach(AnchorRecord& record) const;
@@ -110,11 +117,12 @@ class AnchorManager {
   SeedFeatureFunction seed_;
   std::shared_ptr<const MapView> newest_;  // null before the first Resolve
   std::optional<CameraModel> camera_;
-  std::vector<AnchorRecord> records_;                        // oldest first
-  absl::flat_hash_map<std::string, EditHistory> histories_;  // by session
+  std::vector<AnchorRecord> records_;  // oldest first
+  EditHistories histories_;
   std::deque<PendingEdit> pending_;
   std::uint64_t next_sequence_ = 1;
   std::uint64_t next_content_ = 1;
+  std::uint64_t next_step_ = 1;
 
   mutable std::mutex latest_mutex_;
   std::shared_ptr<const std::vector<Annotation>> latest_;

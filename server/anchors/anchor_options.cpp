@@ -24,8 +24,17 @@ absl::Status AnchorOptions::Validate() const {
     return absl::InvalidArgumentError(
         absl::StrCat("anchors.cluster_size is ", cluster_size, "; give 1 or more"));
   }
+  const auto some = [](const char* name, std::size_t value) {
+    return value > 0 ? absl::OkStatus()
+                     : absl::InvalidArgumentError(
+                           absl::StrCat("anchors.", name, " is 0; give a number above 0"));
+  };
   for (const absl::Status& status :
-       {positive("cluster_softening_m", cluster_softening_m),
+       {some("max_annotations", max_annotations), some("max_ink_points", max_ink_points),
+        some("max_bytes", max_bytes), some("max_session_annotations", max_session_annotations),
+        some("max_session_ink_points", max_session_ink_points),
+        some("max_undo_bytes", max_undo_bytes), some("max_undo_bytes_all", max_undo_bytes_all),
+        positive("cluster_softening_m", cluster_softening_m),
         positive("feature_radius_px", feature_radius_px),
         positive("plane_residual_m", plane_residual_m),
         positive("plane_residual_relative", plane_residual_relative),

@@ -25,8 +25,22 @@ struct AnchorOptions {
   double resume_share = 0.8;   // a paused anchor resumes below this share of the limit
   double moved_m = 0.02;       // a jump above this is reported
   double refine_time_s = 0.5;  // a better depth is taken over this slowly: nothing jumps
+  // Quotas: what stands at one time. A long day with several experts leaves some hundred marks and
+  // strokes of some hundred points. Everything together is 7 MB on the wire: a page that joins has
+  // it in 6 s at 10 Mbit/s, in parts, beside the video. (A stroke has at most 2000 points and a
+  // text 500 bytes: edit_checks.)
   std::size_t max_annotations = 1000;
-  std::size_t max_undo = 100;  // per session
+  std::size_t max_ink_points = 240'000;
+  std::size_t max_bytes = 6'000'000;  // of texts, names and strokes (24 bytes a point)
+  // What one session made and still stands: nobody alone shuts the others out.
+  std::size_t max_session_annotations = 750;
+  std::size_t max_session_ink_points = 180'000;
+  // What can be undone; the oldest step goes first. A recolouring takes 1 kB, a deleted stroke up
+  // to 50 kB: 4 MiB are a hundred steps of anything but the longest strokes, and the sum keeps a
+  // thousand sessions from holding gigabytes.
+  std::size_t max_undo = 100;                 // steps of one session
+  std::size_t max_undo_bytes = 4 << 20;       // of one session
+  std::size_t max_undo_bytes_all = 64 << 20;  // of all sessions together
   /// What makes world the same world after a restart: WorldKey(target). Empty: nothing does, and
   /// stored annotations stay paused.
   std::string world_key;

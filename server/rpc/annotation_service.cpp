@@ -1,5 +1,6 @@
 #include "server/rpc/annotation_service.hpp"
 
+#include "server/rpc/annotation_pages.hpp"
 #include "server/rpc/status.hpp"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/to_proto.hpp"
@@ -117,19 +118,16 @@ grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext*
 }
 
 grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* context,
-                                                  const v1::ListAnnotationsRequest* /*request*/,
+                                                  const v1::ListAnnotationsRequest* request,
                                                   v1::ListAnnotationsResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   if (absl::Status often = gate_.Anyone(*context, Toll::kRead); !often.ok()) {
     return Refuse(reactor, "List", "", often);
   }
-  // Not those of the newest frame: an edit that was answered is here at once. Held: the next edit
-  // replaces the list.
+  // Not those of the newest frame: an edit that was answered is here at once. Held: the list is
+  // replaced by every frame and edit meanwhile.
   const std::shared_ptr<const AnnotationList> annotations = backend_.annotations();
-  for (const Annotation& annotation : *annotations) {
-    *response->add_annotations() = wire::ToProto(annotation);
-  }
-  reactor->Finish(grpc::Status::OK);
+  reactor->Finish(ToGrpc(ListPage(*annotations, *request, *response)));
   return reactor;
 }
 

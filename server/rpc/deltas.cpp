@@ -1,121 +1,206 @@
 #include "server/rpc/deltas.hpp"
 
-#include <cmath>
+#include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kMovedM = 5e-4;
-constexpr double kMovedSigmas = 0.1;
-constexpr double kChangedShare = 0.1;
-constexpr double kMovedPx = 0.25;
-constexpr Timestamp kRefreshNs = 200'000'000;
+// Upper bounds of what one thing adds to an event [bytes]; held against the encoder by a test.
+constexpr std::size_t kFeatureBytes = 160;
+constexpr std::size_t kFeatureRemovalBytes = 10;
+constexpr std::size_t kIdBytes = 40;
+constexpr std::size_t kAnchorBytes = 160;
+constexpr std::size_t kAnnotationBytes = 120;
+constexpr std::size_t kInkPointBytes = 29;
+constexpr std::size_t kLengthBytes = 6;
 
-bool ChangedByShare(double now, double before) {
-  return std::abs(now - before) > kChangedShare * std::max(now, before);
+enum class Lack { kWhole, kEstimate, kRemoval };
+
+// What a reader lacks, one kind after the other, until a part is full.
+template <typename Id, typename Size, typename Put>
+class PartFiller {
+ public:
+  // `size` and `put` take an index, into the list or the removals, and a Lack.
+  PartFiller(const Changes<Id>& changes, ReadPosition& at, Size size, Put put)
+      : changes_(changes), at_(at), size_(std::move(size)), put_(std::move(put)) {}
+
+  void Fill() {
+    if (at_.IsUpTo(changes_.newest)) return;
+    const ChangeNumber had = at_.content;
+    if (FillWhole() && FillEstimates(had)) FillRemovals();
+  }
+
+ private:
+  // All for which `lacks` holds, by the number of their content. `from`: what changed up to there
+  // is of no interest.
+  template <typename Lacks>
+  std::vector<std::uint32_t> Items(ChangeNumber from, Lacks lacks) const {
+    std::vector<std::uint32_t> items;
+    const auto add = [&](std::uint32_t i) {
+      if (lacks(i)) items.push_back(i);
+    };
+    if (from >= changes_.previous) {
+      for (const std::uint32_t i : changes_.changed) add(i);
+    } else {
+      for (std::uint32_t i = 0; i < changes_.numbers.size(); ++i) add(i);
+    }
+    std::sort(items.begin(), items.end(), [this](std::uint32_t a, std::uint32_t b) {
+      return changes_.content_numbers[a] < changes_.content_numbers[b];
+    });
+    return items;
+  }
+
+  bool Add(std::uint32_t index, Lack lack) {
+    bytes_ += size_(index, lack);
+    if (bytes_ > kPartBytes && any_) return false;
+    put_(index, lack);
+    return any_ = true;
+  }
+
+  bool FillWhole() {
+    const auto lacks = [this](std::uint32_t i) {
+      return changes_.content_numbers[i] > at_.content;
+    };
+    for (const std::uint32_t i : Items(at_.content, lacks)) {
+      if (!Add(i, Lack::kWhole)) return false;
+      at_.content = changes_.content_numbers[i];
+    }
+    at_.content = changes_.newest;
+    return true;
+  }
+
+  // Not of what went out whole just now: of those up to content `had`.
+  bool FillEstimates(ChangeNumber had) {
+    if (at_.round_at == 0) at_.round_until = changes_.newest;
+    const auto lacks = [this, had](std::uint32_t i) {
+      return changes_.numbers[i] > at_.estimate && changes_.content_numbers[i] <= had &&
+             changes_.content_numbers[i] > at_.round_at;
+    };
+    for (const std::uint32_t i : Items(at_.estimate, lacks)) {
+      if (!Add(i, Lack::kEstimate)) return false;
+      at_.round_at = changes_.content_numbers[i];
+    }
+    at_.estimate = at_.round_until;
+    at_.round_at = 0;
+    return true;
+  }
+
+  void FillRemovals() {
+    const auto& removed = *changes_.removed;
+    auto at = std::upper_bound(
+        removed.begin(), removed.end(), at_.removal,
+        [](ChangeNumber number, const auto& removal) { return number < removal.number; });
+    for (; at != removed.end(); ++at) {
+      if (!Add(static_cast<std::uint32_t>(at - removed.begin()), Lack::kRemoval)) return;
+      at_.removal = at->number;
+    }
+    at_.removal = changes_.newest;
+  }
+
+  const Changes<Id>& changes_;
+  ReadPosition& at_;
+  const Size size_;
+  const Put put_;
+  std::size_t bytes_ = kLengthBytes + kIdBytes;
+  bool any_ = false;
+};
+
+// The reader knows nothing: what was removed so far is nothing to it, estimates come with the
+// whole.
+template <typename Id>
+ReadPosition Beginning(const Changes<Id>& changes) {
+  ReadPosition at;
+  at.started = true;
+  at.estimate = at.removal = changes.newest;
+  return at;
 }
 
-// How far a shift of the point moves its picture, at most [px].
-double ShiftPx(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const TrackedEvent& event) {
-  const double distance_m = (to - event.snapshot->world_from_camera.translation).norm();
-  const double shift_m = (to - from).norm();
-  if (shift_m == 0.0) return 0.0;
-  return shift_m / std::max(distance_m, 1e-3) / event.camera->RadiansPerPixel();
+std::size_t AnchorBytes(const Anchor& anchor) {
+  return kAnchorBytes + anchor.reason.size() + kLengthBytes;
 }
 
 }  // namespace
 
-bool MapDeltaTracker::Upsert(const FeatureSnapshot& feature) {
-  const double sigma_m = std::sqrt(std::max(0.0, feature.covariance_in_world.trace()));
-  const auto [at, inserted] = sent_.try_emplace(
-      feature.id,
-      Sent{feature.point_in_world, sigma_m, feature.state, feature.depth_known, round_});
-  Sent& sent = at->second;
-  sent.round = round_;
-  if (inserted) return true;
-  const double moved_m = (feature.point_in_world - sent.point_in_world).norm();
-  if (feature.state == sent.state && feature.depth_known == sent.depth_known &&
-      moved_m <= std::max(kMovedM, kMovedSigmas * sent.sigma_m) &&
-      !ChangedByShare(sigma_m, sent.sigma_m)) {
-    return false;
-  }
-  sent = {feature.point_in_world, sigma_m, feature.state, feature.depth_known, round_};
-  return true;
+std::size_t EncodedBytes(const Annotation& annotation) {
+  return kAnnotationBytes + annotation.id.size() + annotation.text.size() +
+         annotation.author.size() + AnchorBytes(annotation.anchor) +
+         kInkPointBytes * annotation.ink_offset_m.size();
 }
 
-bool MapDeltaTracker::Next(const MapSnapshot& snapshot, v1::MapDelta& delta) {
-  const bool full = first_ || snapshot.map_generation != generation_;
+bool MapReader::Next(const NumberedState& state, v1::MapDelta& delta) {
+  const MapSnapshot& snapshot = *state.tracked.snapshot;
+  const Changes<FeatureId>& changes = *state.map;
+  const bool full =
+      !at_.started || snapshot.map_generation != generation_ || at_.removal < changes.forgotten;
+  if (full) at_ = Beginning(changes);
   const bool jumped = snapshot.map_revision != revision_;
-  if (full) sent_.clear();
-  first_ = false;
   generation_ = snapshot.map_generation;
   revision_ = snapshot.map_revision;
-  ++round_;
   delta.Clear();
   delta.set_map_generation(snapshot.map_generation);
   delta.set_map_revision(snapshot.map_revision);
   delta.set_frame_id(snapshot.frame_id);
   delta.set_full(full);
-  for (const FeatureSnapshot& feature : snapshot.features) {
-    if (Upsert(feature)) *delta.add_upserted() = wire::ToProto(feature);
-  }
-  absl::erase_if(sent_, [this, &delta](const auto& entry) {
-    if (entry.second.round == round_) return false;
-    delta.add_removed_ids(entry.first);
-    return true;
-  });
+  const auto size = [](std::uint32_t, Lack lack) {
+    return lack == Lack::kRemoval ? kFeatureRemovalBytes : kFeatureBytes;
+  };
+  const auto put = [&](std::uint32_t index, Lack lack) {
+    if (lack == Lack::kRemoval) {
+      delta.add_removed_ids((*changes.removed)[index].id);
+    } else {
+      *delta.add_upserted() = wire::ToProto(snapshot.features[index]);
+    }
+  };
+  PartFiller(changes, at_, size, put).Fill();
+  delta.set_more(!at_.IsUpTo(changes.newest));
   return full || jumped || delta.upserted_size() > 0 || delta.removed_ids_size() > 0;
 }
 
-bool AnnotationDeltaTracker::Upsert(const Annotation& annotation, const TrackedEvent& event,
-                                    Timestamp now_ns) {
-  const Anchor& anchor = annotation.anchor;
-  const Sent now{annotation.revision,
-                 anchor.state,
-                 anchor.point_in_world,
-                 anchor.error_m,
-                 anchor.error_px.has_value(),
-                 now_ns,
-                 round_};
-  const auto [at, inserted] = sent_.try_emplace(annotation.id, now);
-  Sent& sent = at->second;
-  sent.round = round_;
-  if (inserted) return true;
-  const bool edited = now.revision != sent.revision || now.state != sent.state;
-  const bool moved = ShiftPx(sent.point_in_world, now.point_in_world, event) > kMovedPx;
-  const bool aged = now_ns - sent.time_ns >= kRefreshNs &&
-                    (now.in_view != sent.in_view || ChangedByShare(now.error_m, sent.error_m));
-  if (!edited && !moved && !aged) return false;
-  sent = now;
-  return true;
-}
-
-bool AnnotationDeltaTracker::Next(const TrackedEvent& event, Timestamp now_ns,
-                                  v1::AnnotationEvent& delta) {
-  const bool full = first_;
-  first_ = false;
-  ++round_;
+bool AnnotationReader::Next(const NumberedState& state, v1::AnnotationEvent& delta) {
+  const AnnotationList& annotations = *state.tracked.annotations;
+  const Changes<std::string>& changes = *state.annotations;
+  const bool full = !at_.started || at_.removal < changes.forgotten;
+  if (full) at_ = Beginning(changes);
   delta.Clear();
   delta.set_full(full);
-  for (const Annotation& annotation : *event.annotations) {
-    if (Upsert(annotation, event, now_ns)) {
-      *delta.add_upserted() = wire::ToProto(annotation);
+  const auto without_stroke = [&](std::uint32_t index, Lack lack) {
+    return lack == Lack::kEstimate && !annotations[index].ink_offset_m.empty();
+  };
+  const auto size = [&](std::uint32_t index, Lack lack) {
+    if (lack == Lack::kRemoval) return kIdBytes;
+    return without_stroke(index, lack) ? kIdBytes + AnchorBytes(annotations[index].anchor)
+                                       : EncodedBytes(annotations[index]);
+  };
+  const auto put = [&](std::uint32_t index, Lack lack) {
+    if (lack == Lack::kRemoval) {
+      delta.add_removed_ids((*changes.removed)[index].id);
+    } else if (without_stroke(index, lack)) {
+      v1::AnchorUpdate& update = *delta.add_anchors();
+      update.set_id(annotations[index].id);
+      *update.mutable_anchor() = wire::ToProto(annotations[index].anchor);
+    } else {
+      *delta.add_upserted() = wire::ToProto(annotations[index]);
     }
-  }
-  absl::erase_if(sent_, [this, &delta](const auto& entry) {
-    if (entry.second.round == round_) return false;
-    delta.add_removed_ids(entry.first);
-    return true;
-  });
-  return full || delta.upserted_size() > 0 || delta.removed_ids_size() > 0;
+  };
+  PartFiller(changes, at_, size, put).Fill();
+  delta.set_more(!at_.IsUpTo(changes.newest));
+  return full || delta.upserted_size() > 0 || delta.anchors_size() > 0 ||
+         delta.removed_ids_size() > 0;
 }
 
 v1::MapDelta FullMap(const MapSnapshot& snapshot) {
-  MapDeltaTracker tracker;
   v1::MapDelta delta;
-  tracker.Next(snapshot, delta);
+  delta.set_map_generation(snapshot.map_generation);
+  delta.set_map_revision(snapshot.map_revision);
+  delta.set_frame_id(snapshot.frame_id);
+  delta.set_full(true);
+  for (const FeatureSnapshot& feature : snapshot.features) {
+    *delta.add_upserted() = wire::ToProto(feature);
+  }
   return delta;
 }
 

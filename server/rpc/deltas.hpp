@@ -1,64 +1,60 @@
 #pragma once
 
-#include <absl/container/flat_hash_map.h>
-
+#include <cstddef>
 #include <cstdint>
-#include <string>
 
 #include "saccade/v1/session.pb.h"
-#include "server/pipeline/events.hpp"
+#include "server/rpc/change_log.hpp"
 
 namespace saccade {
 
-/// What one subscriber knows of the map; turns the newest snapshot into what it lacks.
-class MapDeltaTracker {
+/// An event is at most about this large encoded: far below what a receiver takes by default (4
+/// MiB), and video and poses go out between the parts of a large state.
+inline constexpr std::size_t kPartBytes = 256 << 10;
+
+/// At most how large an annotation is encoded.
+std::size_t EncodedBytes(const Annotation& annotation);
+
+/// How far one reader is in the changes of a list. What it lacks is handed out in this order: what
+/// it never had (by the number of its content), then newer estimates of what it has, then removals.
+/// Estimates go round: whoever is slow gets all of them, not those at the front again and again.
+struct ReadPosition {
+  bool started = false;
+  ChangeNumber content = 0;   // has everything made or edited up to here
+  ChangeNumber estimate = 0;  // ... and every estimate up to here
+  ChangeNumber removal = 0;   // ... and knows of every removal up to here
+  // A round of estimates under way: up to which content it came, and what will be known after it.
+  ChangeNumber round_at = 0, round_until = 0;
+
+  bool IsUpTo(ChangeNumber newest) const {
+    return content == newest && estimate == newest && removal == newest && round_at == 0;
+  }
+};
+
+/// One subscriber's map; turns a state into what it lacks.
+class MapReader {
  public:
-  /// Fills `delta` and takes it as sent; false if there is nothing worth sending. Features count as
-  /// changed when their state did, when they moved by a tenth of their sigma or half a millimetre,
-  /// or when their sigma changed by a tenth. The first delta, and the first of a new map, is full.
-  bool Next(const MapSnapshot& snapshot, v1::MapDelta& delta);
+  /// Fills `delta` with the next part of what is lacking, takes it as sent and sets `more` if there
+  /// are others; false if there is nothing worth sending. The first part of a subscription, and of
+  /// a new map, is `full`.
+  bool Next(const NumberedState& state, v1::MapDelta& delta);
 
  private:
-  struct Sent {
-    Eigen::Vector3d point_in_world;
-    double sigma_m;  // root of the covariance's trace
-    FeatureState state;
-    bool depth_known;
-    std::uint64_t round;  // the last snapshot that had it
-  };
-  bool Upsert(const FeatureSnapshot& feature);
-
-  absl::flat_hash_map<FeatureId, Sent> sent_;
-  bool first_ = true;
+  ReadPosition at_;
   std::uint64_t generation_ = 0;
   std::uint64_t revision_ = 0;
-  std::uint64_t round_ = 0;
 };
 
-/// The same for annotations. Edits and changes of state are always sent; a live estimate when it
-/// moved by a quarter of a pixel, or every 200 ms when its error changed by a tenth.
-class AnnotationDeltaTracker {
+/// The same for annotations. A live estimate of a stroke that was sent goes without the stroke.
+class AnnotationReader {
  public:
-  bool Next(const TrackedEvent& event, Timestamp now_ns, v1::AnnotationEvent& delta);
+  bool Next(const NumberedState& state, v1::AnnotationEvent& delta);
 
  private:
-  struct Sent {
-    std::uint64_t revision;
-    AnchorState state;
-    Eigen::Vector3d point_in_world;
-    double error_m;
-    bool in_view;
-    Timestamp time_ns;
-    std::uint64_t round;
-  };
-  bool Upsert(const Annotation& annotation, const TrackedEvent& event, Timestamp now_ns);
-
-  absl::flat_hash_map<std::string, Sent> sent_;
-  bool first_ = true;
-  std::uint64_t round_ = 0;
+  ReadPosition at_;
 };
 
-/// The whole map in one message.
+/// The whole map in one message: 3000 landmarks, as many as a map keeps, are below 0.5 MB.
 v1::MapDelta FullMap(const MapSnapshot& snapshot);
 
 }  // namespace saccade

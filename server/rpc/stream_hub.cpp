@@ -75,11 +75,17 @@ void StreamHub::AbandonTheSilent(Timestamp now_ns) {
 void StreamHub::Distribute(const Message& message) {
   // Statistics come once a second.
   if (std::holds_alternative<EngineStatistics>(message)) AbandonTheSilent(MonotonicNow());
+  std::optional<NumberedState> state;
+  if (const auto* tracked = std::get_if<TrackedEvent>(&message)) {
+    state = log_.Next(*tracked, MonotonicNow());
+    const std::lock_guard lock(mutex_);
+    numbered_ = state;
+  }
   const std::shared_ptr<const v1::PresenceEvent> present = presence();
   for (const std::shared_ptr<Subscriber>& stream : Streams()) {
     stream->Update([&](Subscription& subscription) {
-      if (const auto* tracked = std::get_if<TrackedEvent>(&message)) {
-        subscription.Offer(*tracked);
+      if (state) {
+        subscription.Offer(*state);
       } else if (const auto* packet = std::get_if<std::shared_ptr<const VideoPacket>>(&message)) {
         subscription.Offer(*packet);
       } else if (const auto* statistics = std::get_if<EngineStatistics>(&message)) {
@@ -97,11 +103,11 @@ void StreamHub::Distribute(const Message& message) {
 
 void StreamHub::Add(const std::shared_ptr<Subscriber>& subscriber) {
   const auto offer_state = [&] {
-    const std::optional<TrackedEvent> tracked = newest();
+    const std::optional<NumberedState> state = numbered();
     const std::optional<std::uint64_t> end = end_of_source();
     const std::shared_ptr<const v1::PresenceEvent> present = presence();
     subscriber->Update([&](Subscription& subscription) {
-      if (tracked) subscription.Offer(*tracked);
+      if (state) subscription.Offer(*state);
       subscription.OfferGaze(backend_->gaze());
       if (end) subscription.OfferEnd(*end);
       subscription.OfferPresence(present);
@@ -203,6 +209,11 @@ std::vector<std::shared_ptr<Subscriber>> StreamHub::Streams() const {
 std::optional<TrackedEvent> StreamHub::newest() const {
   const std::lock_guard lock(mutex_);
   return newest_;
+}
+
+std::optional<NumberedState> StreamHub::numbered() const {
+  const std::lock_guard lock(mutex_);
+  return numbered_;
 }
 
 EngineStatistics StreamHub::statistics() const {

@@ -106,6 +106,7 @@ class StreamHub : public EventSink {
   /// False: closed. `replaced` is the stream that the same session had.
   bool Insert(const std::shared_ptr<Subscriber>& subscriber, std::shared_ptr<Subscriber>& replaced);
   std::vector<std::shared_ptr<Subscriber>> Streams() const;
+  std::optional<NumberedState> numbered() const;
   void StreamsChanged();
 
   const Timestamp silence_ns_;
@@ -114,9 +115,11 @@ class StreamHub : public EventSink {
   std::vector<std::shared_ptr<Subscriber>> streams_;
   bool closed_ = false;
   std::optional<TrackedEvent> newest_;
+  std::optional<NumberedState> numbered_;  // the newest that the hub's thread has worked out
   EngineStatistics statistics_;
   std::shared_ptr<const v1::PresenceEvent> presence_;
   std::optional<std::uint64_t> end_frames_;
+  ChangeLog log_;           // the hub's thread
   Runner<Message> runner_;  // last: its thread uses everything above
 };
 

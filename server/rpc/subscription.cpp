@@ -60,10 +60,10 @@ absl::StatusOr<SubscriptionOptions> SubscriptionOptions::FromProto(
   return options;
 }
 
-void Subscription::Offer(const TrackedEvent& event) {
+void Subscription::Offer(const NumberedState& state) {
   // Between frames the annotations alone change: the pose is known already.
-  const bool same_frame = tracked_ && tracked_->snapshot == event.snapshot;
-  tracked_ = event;
+  const bool same_frame = state_ && state_->tracked.snapshot == state.tracked.snapshot;
+  state_ = state;
   annotations_due_ = true;
   if (same_frame) return;
   if (pose_due_ && Has(v1::TOPIC_POSE)) ++poses_skipped_;
@@ -124,11 +124,9 @@ bool Subscription::Next(Timestamp now_ns, v1::Event& event) {
 bool Subscription::Fill(Kind kind, Timestamp now_ns, v1::Event& event) {
   switch (kind) {
     case kAnnotations:
-      return Has(v1::TOPIC_ANNOTATION) && std::exchange(annotations_due_, false) &&
-             annotations_.Next(*tracked_, now_ns, *event.mutable_annotation());
+      return Has(v1::TOPIC_ANNOTATION) && FillAnnotations(event);
     case kMap:
-      return Has(v1::TOPIC_MAP) && std::exchange(map_due_, false) &&
-             map_.Next(*tracked_->snapshot, *event.mutable_map());
+      return Has(v1::TOPIC_MAP) && FillMap(event);
     case kPresence:
       if (!Has(v1::TOPIC_PRESENCE) || presence_ == nullptr) return false;
       *event.mutable_presence() = *std::exchange(presence_, nullptr);
@@ -153,9 +151,25 @@ bool Subscription::Fill(Kind kind, Timestamp now_ns, v1::Event& event) {
   return false;
 }
 
+// The parts of a large state follow at once, in turn with the other kinds.
+bool Subscription::FillAnnotations(v1::Event& event) {
+  if (!annotations_due_) return false;
+  const bool filled = annotations_.Next(*state_, *event.mutable_annotation());
+  annotations_due_ = event.annotation().more();
+  return filled;
+}
+
+bool Subscription::FillMap(v1::Event& event) {
+  if (!map_due_) return false;
+  const bool filled = map_.Next(*state_, *event.mutable_map());
+  map_due_ = event.map().more();
+  return filled;
+}
+
 bool Subscription::FillPose(v1::Event& event) {
   if (!Has(v1::TOPIC_POSE) || !std::exchange(pose_due_, false)) return false;
-  *event.mutable_pose() = wire::ToProtoPose(*tracked_->snapshot, tracked_->stages.captured_ns);
+  const TrackedEvent& tracked = state_->tracked;
+  *event.mutable_pose() = wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns);
   return true;
 }
 

@@ -36,7 +36,7 @@ class Subscription {
  public:
   explicit Subscription(const SubscriptionOptions& options) : options_(options) {}
 
-  void Offer(const TrackedEvent& event);
+  void Offer(const NumberedState& state);
   void Offer(const std::shared_ptr<const VideoPacket>& packet);
   void Offer(const EngineStatistics& statistics);
   void OfferGaze(std::shared_ptr<const GazeSnapshot> state);
@@ -68,6 +68,8 @@ class Subscription {
   bool WindowOpen() const { return sequence_ - acknowledged_ < options_.window; }
   bool Fill(Kind kind, Timestamp now_ns, v1::Event& event);
   bool FillVideo(Timestamp now_ns, v1::Event& event);
+  bool FillAnnotations(v1::Event& event);
+  bool FillMap(v1::Event& event);
   bool FillPose(v1::Event& event);
   bool FillStatistics(v1::Event& event);
 
@@ -77,14 +79,14 @@ class Subscription {
   std::optional<Timestamp> unacknowledged_since_;
   int last_kind_ = kKinds - 1;
 
-  std::optional<TrackedEvent> tracked_;  // the newest
-  // Whether `tracked_` is yet to be looked at, by kind.
+  std::optional<NumberedState> state_;  // the newest
+  // Whether `state_` is yet to be looked at, by kind.
   bool pose_due_ = false, map_due_ = false, annotations_due_ = false;
   // No mount, until somebody says otherwise.
   std::shared_ptr<const GazeSnapshot> gaze_ = std::make_shared<const GazeSnapshot>();
   std::shared_ptr<const GazeSnapshot> gaze_seen_;
-  MapDeltaTracker map_;
-  AnnotationDeltaTracker annotations_;
+  MapReader map_;
+  AnnotationReader annotations_;
   VideoQueue video_;
   std::shared_ptr<const v1::PresenceEvent> presence_, presence_seen_;
   std::optional<EngineStatistics> statistics_;

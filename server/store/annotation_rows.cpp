@@ -57,6 +57,7 @@ absl::Status Upsert(SqliteDatabase& database, const StoredAnnotation& stored) {
   const Annotation& annotation = stored.annotation;
   const Anchor& anchor = annotation.anchor;
   std::vector<double> ink;
+  ink.reserve(3 * annotation.ink_offset_m.size());
   for (const Eigen::Vector3d& offset : annotation.ink_offset_m) {
     ink.insert(ink.end(), {offset.x(), offset.y(), offset.z()});
   }
@@ -130,9 +131,12 @@ std::optional<StoredAnnotation> ReadRow(const SqliteStatement& row) {
   annotation.shape = static_cast<AnnotationShape>(row.Int(1));
   anchor.method = static_cast<AnchorMethod>(row.Int(8));
   anchor.covariance_in_world << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+  InkStroke::Points points;
+  points.reserve(ink.size() / 3);
   for (std::size_t i = 0; i < ink.size(); i += 3) {
-    annotation.ink_offset_m.emplace_back(ink[i], ink[i + 1], ink[i + 2]);
+    points.emplace_back(ink[i], ink[i + 1], ink[i + 2]);
   }
+  annotation.ink_offset_m = std::move(points);
   return stored;
 }
 

@@ -1,9 +1,13 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cstddef>
 #include <cstdint>
+#include <initializer_list>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -64,6 +68,34 @@ struct Anchor {
   bool place_known = true;
 };
 
+/// The points of an ink stroke: never changed once made, so that copies share them. An annotation
+/// is copied for every frame, for what can be undone and for every reader; its stroke is not.
+class InkStroke {
+ public:
+  using Points = std::vector<Eigen::Vector3d>;
+
+  InkStroke() = default;
+  InkStroke(Points points)  // NOLINT(google-explicit-constructor): a list of points is a stroke
+      : points_(points.empty() ? nullptr : std::make_shared<const Points>(std::move(points))) {}
+  InkStroke(std::initializer_list<Eigen::Vector3d> points) : InkStroke(Points(points)) {}
+
+  bool empty() const { return points_ == nullptr; }
+  std::size_t size() const { return empty() ? 0 : points_->size(); }
+  const Eigen::Vector3d* begin() const { return empty() ? nullptr : points_->data(); }
+  const Eigen::Vector3d* end() const { return begin() + size(); }
+  const Eigen::Vector3d& operator[](std::size_t i) const { return (*points_)[i]; }
+  std::size_t bytes() const { return size() * sizeof(Eigen::Vector3d); }
+
+  /// Equal for copies of one stroke, and for them alone.
+  const void* identity() const { return points_.get(); }
+  friend bool operator==(const InkStroke& a, const InkStroke& b) {
+    return a.points_ == b.points_ || (!a.empty() && !b.empty() && *a.points_ == *b.points_);
+  }
+
+ private:
+  std::shared_ptr<const Points> points_;  // null: no point
+};
+
 struct Annotation {
   std::string id;  // UUID, outlives the session
   AnnotationShape shape = AnnotationShape::kCube;
@@ -75,8 +107,14 @@ struct Annotation {
   std::uint64_t revision = 0;  // rises with each edit
   Anchor anchor;
   /// kInk: the stroke relative to the anchor, axes parallel to world [m].
-  std::vector<Eigen::Vector3d> ink_offset_m;
+  InkStroke ink_offset_m;
 };
+
+/// The order of lists: oldest first. Strict also between annotations of the same nanosecond.
+inline bool CreatedBefore(const Annotation& a, const Annotation& b) {
+  return a.created_unix_ns != b.created_unix_ns ? a.created_unix_ns < b.created_unix_ns
+                                                : a.id < b.id;
+}
 
 /// A change of an existing annotation; what is not set stays.
 struct AnnotationPatch {

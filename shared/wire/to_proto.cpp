@@ -214,6 +214,19 @@ v1::PoseEvent ToProtoPose(const MapSnapshot& snapshot, Timestamp captured_ns) {
   return message;
 }
 
+v1::Anchor ToProto(const Anchor& anchor) {
+  v1::Anchor message;
+  message.set_state(ToProto(anchor.state));
+  message.set_method(ToProto(anchor.method));
+  if (anchor.place_known) *message.mutable_point_in_world_m() = ToProto(anchor.point_in_world);
+  *message.mutable_covariance_in_world_m2() = ToProto(anchor.covariance_in_world);
+  message.set_error_mm(anchor.error_m * 1e3);
+  if (anchor.error_px) message.set_error_px(*anchor.error_px);
+  message.set_reason(anchor.reason);
+  if (anchor.pixel) *message.mutable_pixel() = ToProto(*anchor.pixel);
+  return message;
+}
+
 v1::Annotation ToProto(const Annotation& annotation) {
   v1::Annotation message;
   message.set_id(annotation.id);
@@ -224,17 +237,8 @@ v1::Annotation ToProto(const Annotation& annotation) {
   message.set_color_rgba(annotation.color_rgba);
   message.set_created_unix_ns(annotation.created_unix_ns);
   message.set_revision(annotation.revision);
-  v1::Anchor& anchor = *message.mutable_anchor();
-  anchor.set_state(ToProto(annotation.anchor.state));
-  anchor.set_method(ToProto(annotation.anchor.method));
-  if (annotation.anchor.place_known) {
-    *anchor.mutable_point_in_world_m() = ToProto(annotation.anchor.point_in_world);
-  }
-  *anchor.mutable_covariance_in_world_m2() = ToProto(annotation.anchor.covariance_in_world);
-  anchor.set_error_mm(annotation.anchor.error_m * 1e3);
-  if (annotation.anchor.error_px) anchor.set_error_px(*annotation.anchor.error_px);
-  anchor.set_reason(annotation.anchor.reason);
-  if (annotation.anchor.pixel) *anchor.mutable_pixel() = ToProto(*annotation.anchor.pixel);
+  *message.mutable_anchor() = ToProto(annotation.anchor);
+  message.mutable_ink_offset_m()->Reserve(static_cast<int>(annotation.ink_offset_m.size()));
   for (const Eigen::Vector3d& offset : annotation.ink_offset_m) {
     *message.add_ink_offset_m() = ToProto(offset);
   }

@@ -27,6 +27,7 @@ v1::AnnotationShape ToProto(AnnotationShape shape);
 /// `captured_ns`: the frame's exposure middle on the server's monotonic clock.
 v1::PoseEvent ToProtoPose(const MapSnapshot& snapshot, Timestamp captured_ns);
 
+v1::Anchor ToProto(const Anchor& anchor);
 v1::Annotation ToProto(const Annotation& annotation);
 
 /// A target as a client asks for it.

@@ -173,12 +173,5 @@ TEST_F(Edits, UnknownIdsAndEmptyPatchesAreNamed) {
             absl::StatusCode::kInvalidArgument);
 }
 
-TEST_F(Edits, TooManyAnnotationsAreRefused) {
-  for (std::size_t i = 0; i < AnchorOptions().max_annotations; ++i) {
-    ASSERT_TRUE(rig_.PlaceAt({0, 0, 2}, "a").ok());
-  }
-  EXPECT_EQ(rig_.PlaceAt({0, 0, 2}, "a").status().code(), absl::StatusCode::kResourceExhausted);
-}
-
 }  // namespace
 }  // namespace saccade

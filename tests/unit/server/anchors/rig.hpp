@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
@@ -17,10 +18,11 @@ inline AnchorOptions RigOptions() {
 
 /// A room, a ring of frames and the manager under test.
 struct Rig {
-  explicit Rig(const SyntheticMap::Options& options = {}, SeedFeatureFunction seed = nullptr)
+  explicit Rig(const SyntheticMap::Options& options = {}, SeedFeatureFunction seed = nullptr,
+               AnchorOptions anchors = RigOptions())
       : map(options),
         manager(
-            RigOptions(), [this](FrameId id) { return ring.Find(id); }, std::move(seed)) {}
+            std::move(anchors), [this](FrameId id) { return ring.Find(id); }, std::move(seed)) {}
 
   std::shared_ptr<const MapSnapshot> Show(const Rigid3& true_pose) {
     std::shared_ptr<const MapSnapshot> snapshot = map.Snapshot(true_pose);
@@ -36,6 +38,17 @@ struct Rig {
   absl::StatusOr<AnnotationEdit> PlaceAt(const Eigen::Vector3d& point, const std::string& session) {
     AnnotationDraft draft;
     draft.target = PointTarget{point};
+    return manager.Create(draft, session);
+  }
+  /// A wavy stroke of so many points about the middle of the newest frame.
+  absl::StatusOr<AnnotationEdit> Draw(std::size_t points, const std::string& session) {
+    AnnotationDraft draft;
+    draft.shape = AnnotationShape::kInk;
+    draft.target = PixelTarget{map.next_frame - 1, Eigen::Vector2d(320, 240)};
+    for (std::size_t i = 0; i < points; ++i) {
+      const double t = static_cast<double>(i) / static_cast<double>(points);
+      draft.ink_px.emplace_back(300 + 40 * t, 240 + 10 * std::sin(20 * t));
+    }
     return manager.Create(draft, session);
   }
   const Annotation& Only() {

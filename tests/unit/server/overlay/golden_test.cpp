@@ -103,9 +103,11 @@ std::vector<Annotation> Annotations() {
   list[4].anchor.state = AnchorState::kPaused;
   list[5].anchor.state = AnchorState::kProvisional;
   list[5].size_m = 0.2;
+  InkStroke::Points ink;
   for (int k = 0; k < 12; ++k) {
-    list[3].ink_offset_m.emplace_back(0.02 * k, 0.05 * std::sin(0.8 * k), 0.01 * k);
+    ink.emplace_back(0.02 * k, 0.05 * std::sin(0.8 * k), 0.01 * k);
   }
+  list[3].ink_offset_m = std::move(ink);
   return list;
 }
 

@@ -140,7 +140,9 @@ TEST(Overlay, NonsenseNeverCrashesOrHangs) {
       annotations[i].text = std::string("a\xc3\xb6\n\xff") + std::string(run, 'x');
       annotations[i].anchor.point_in_world = point();
       annotations[i].anchor.state = static_cast<AnchorState>(random() % 4);
-      for (int k = 0; k < 20; ++k) annotations[i].ink_offset_m.push_back(point());
+      InkStroke::Points ink;
+      for (int k = 0; k < 20; ++k) ink.push_back(point());
+      annotations[i].ink_offset_m = std::move(ink);
     }
     snapshot.advice = std::string(run, 'w');
     const cv::Mat picture =

@@ -25,60 +25,67 @@ MapSnapshot MakeMap(std::initializer_list<FeatureId> ids) {
   return map;
 }
 
-TEST(MapDeltaTracker, TheFirstDeltaIsFullAndAnUnchangedMapIsSilent) {
-  MapDeltaTracker tracker;
+// One reader that is given every map of one log.
+class MapDelta : public ::testing::Test {
+ protected:
+  bool Next(const MapSnapshot& map, v1::MapDelta& delta) {
+    TrackedEvent event = MakeTracked(0);
+    event.snapshot = std::make_shared<MapSnapshot>(map);
+    return reader_.Next(log_.Next(event, 0), delta);
+  }
+  ChangeLog log_;
+  MapReader reader_;
+};
+
+TEST_F(MapDelta, TheFirstDeltaIsFullAndAnUnchangedMapIsSilent) {
   v1::MapDelta delta;
-  ASSERT_TRUE(tracker.Next(MakeMap({1, 2}), delta));
+  ASSERT_TRUE(Next(MakeMap({1, 2}), delta));
   EXPECT_TRUE(delta.full());
   EXPECT_EQ(delta.upserted_size(), 2);
-  EXPECT_FALSE(tracker.Next(MakeMap({1, 2}), delta));
+  EXPECT_FALSE(Next(MakeMap({1, 2}), delta));
 }
 
-TEST(MapDeltaTracker, SendsWhatChangedAndWhatWent) {
-  MapDeltaTracker tracker;
+TEST_F(MapDelta, SendsWhatChangedAndWhatWent) {
   v1::MapDelta delta;
-  tracker.Next(MakeMap({1, 2, 3}), delta);
+  Next(MakeMap({1, 2, 3}), delta);
   MapSnapshot map = MakeMap({1, 3, 4});
   map.features[0].state = FeatureState::kMeasured;
   map.features[1].point_in_world.x() += 1e-5;  // a hundredth of sigma: not worth a byte
-  ASSERT_TRUE(tracker.Next(map, delta));
+  ASSERT_TRUE(Next(map, delta));
   EXPECT_FALSE(delta.full());
   ASSERT_EQ(delta.upserted_size(), 2);
-  EXPECT_EQ(delta.upserted(0).id(), 1u);
-  EXPECT_EQ(delta.upserted(1).id(), 4u);
+  EXPECT_EQ(delta.upserted(0).id(), 4u) << "new ones first";
+  EXPECT_EQ(delta.upserted(1).id(), 1u);
   EXPECT_THAT(delta.removed_ids(), ::testing::ElementsAre(2u));
 }
 
-TEST(MapDeltaTracker, SmallMovesAddUpUntilTheyAreSent) {
-  MapDeltaTracker tracker;
+TEST_F(MapDelta, SmallMovesAddUpUntilTheyAreSent) {
   v1::MapDelta delta;
   MapSnapshot map = MakeMap({1});
-  tracker.Next(map, delta);
+  Next(map, delta);
   bool sent = false;
   for (int i = 0; i < 100 && !sent; ++i) {
     map.features[0].point_in_world.x() += 1e-4;
-    sent = tracker.Next(map, delta);
+    sent = Next(map, delta);
   }
   EXPECT_TRUE(sent);
 }
 
-TEST(MapDeltaTracker, ANewMapIsFullAgain) {
-  MapDeltaTracker tracker;
+TEST_F(MapDelta, ANewMapIsFullAgain) {
   v1::MapDelta delta;
-  tracker.Next(MakeMap({1, 2}), delta);
+  Next(MakeMap({1, 2}), delta);
   MapSnapshot map = MakeMap({1});
   map.map_generation = 1;
-  ASSERT_TRUE(tracker.Next(map, delta));
+  ASSERT_TRUE(Next(map, delta));
   EXPECT_TRUE(delta.full());
   EXPECT_EQ(delta.upserted_size(), 1);
   EXPECT_EQ(delta.removed_ids_size(), 0);
 }
 
 // A receiver that applies every delta has the server's map.
-TEST(MapDeltaTracker, DeltasAddUpToTheMap) {
+TEST_F(MapDelta, DeltasAddUpToTheMap) {
   std::mt19937 random(3);
   std::uniform_int_distribution<FeatureId> pick(0, 29);
-  MapDeltaTracker tracker;
   v1::MapDelta delta;
   std::map<FeatureId, double> received;
   MapSnapshot map;
@@ -91,7 +98,7 @@ TEST(MapDeltaTracker, DeltasAddUpToTheMap) {
       feature.point_in_world.x() = round;
       map.features.push_back(feature);
     }
-    if (!tracker.Next(map, delta)) continue;
+    if (!Next(map, delta)) continue;
     for (const auto removed : delta.removed_ids()) received.erase(removed);
     for (const v1::Feature& feature : delta.upserted()) {
       received[feature.id()] = feature.point_in_world_m().x();
@@ -102,8 +109,9 @@ TEST(MapDeltaTracker, DeltasAddUpToTheMap) {
   }
 }
 
-TEST(AnnotationDeltaTracker, EditsGoAtOnceAndNoiseDoesNot) {
-  AnnotationDeltaTracker tracker;
+TEST(AnnotationDelta, EditsGoAtOnceAndNoiseDoesNot) {
+  ChangeLog log;
+  AnnotationReader reader;
   v1::AnnotationEvent delta;
   TrackedEvent event = MakeTracked(1);
   Annotation note;
@@ -112,7 +120,7 @@ TEST(AnnotationDeltaTracker, EditsGoAtOnceAndNoiseDoesNot) {
   note.anchor.error_m = 0.01;
   const auto publish = [&](Timestamp now_ns) {
     event.annotations = std::make_shared<AnnotationList>(1, note);
-    return tracker.Next(event, now_ns, delta);
+    return reader.Next(log.Next(event, now_ns), delta);
   };
   ASSERT_TRUE(publish(0));
   EXPECT_TRUE(delta.full());
@@ -130,7 +138,7 @@ TEST(AnnotationDeltaTracker, EditsGoAtOnceAndNoiseDoesNot) {
   note.anchor.state = AnchorState::kPaused;
   EXPECT_TRUE(publish(300'000'001));
   event.annotations = std::make_shared<AnnotationList>();
-  ASSERT_TRUE(tracker.Next(event, 300'000'002, delta));
+  ASSERT_TRUE(reader.Next(log.Next(event, 300'000'002), delta));
   EXPECT_THAT(delta.removed_ids(), ::testing::ElementsAre("a"));
 }
 

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "server/pipeline/events.hpp"
+#include "server/rpc/subscription.hpp"
 
 namespace saccade::testing {
 
@@ -35,5 +36,16 @@ inline std::shared_ptr<const VideoPacket> MakePacket(std::uint64_t index, bool k
   packet->tracked.stages.encoded_ns = encoded_ns;
   return packet;
 }
+
+/// A subscription that is fed as by the hub: what is tracked is numbered first.
+class FedSubscription : public Subscription {
+ public:
+  using Subscription::Offer;
+  using Subscription::Subscription;
+  void Offer(const TrackedEvent& event, Timestamp now_ns = 0) { Offer(log_.Next(event, now_ns)); }
+
+ private:
+  ChangeLog log_;
+};
 
 }  // namespace saccade::testing

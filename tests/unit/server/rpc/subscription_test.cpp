@@ -13,6 +13,7 @@ namespace {
 using testing::MakePacket;
 using testing::MakeTracked;
 using Case = v1::Event::EventCase;
+using Subscription = testing::FedSubscription;
 
 SubscriptionOptions Everything(std::uint32_t window = 32) {
   SubscriptionOptions options;
