@@ -43,12 +43,23 @@ export interface Stages {
   readonly queued: number;
 }
 
+/** A feature as one frame saw it: where it measured it, or where it expected it and found nothing. */
+export interface SeenFeature {
+  readonly state: 'measured' | 'failed';
+  readonly pixel: Pixel;
+}
+
+/** By feature id, of that very frame; what is not in it was not searched for. */
+export type FrameFeatures = ReadonlyMap<number, SeenFeature>;
+
 /** What is known of a frame before its picture is decoded: everything but the picture. */
 export interface FrameFacts {
   readonly frameId: number;
   readonly view: View;
   readonly pose: Pose | undefined;
   readonly camera: Camera;
+  /** Undefined: the server did not say. */
+  readonly features?: FrameFeatures | undefined;
   readonly stages: Stages;
   readonly arrivedMs: number; // this page's clock, performance.timeOrigin + now()
 }
@@ -100,6 +111,7 @@ export interface Participant {
   readonly role: Role;
 }
 
+/** The server's, over the last seconds. */
 export interface Statistics {
   readonly capturedFps: number;
   readonly trackedFps: number;
@@ -118,10 +130,29 @@ export type Target =
 
 export type Link =
   | { readonly kind: 'connecting' }
+  /** As many tabs of this browser are connected as it has connections for. */
+  | { readonly kind: 'crowded'; readonly tabs: number }
   | { readonly kind: 'live' }
   | { readonly kind: 'reconnecting'; readonly reason: string; readonly sinceMs: number }
   | { readonly kind: 'refused'; readonly reason: string };
 
-/** An anchor whose place is not to be relied upon (drawn hollow and named so). */
-export const doNotTrust = (anchor: Anchor): boolean =>
-  anchor.state === 'paused' || anchor.state === 'stopped';
+/** Above these a mark is not to be trusted (annotation.proto, AnchorState). */
+export const LIMIT_MM = 50;
+export const LIMIT_PX = 10;
+
+/**
+ * An anchor whose place is not to be relied upon (drawn hollow and named so). While it is provisional
+ * the server has not judged it yet: then its expected error does. Without scale there are no
+ * millimetres, and a provisional depth is known to no better than a tenth: more than the server allows.
+ */
+export function doNotTrust(anchor: Anchor, metric: boolean): boolean {
+  switch (anchor.state) {
+    case 'paused':
+    case 'stopped':
+      return true;
+    case 'provisional':
+      return !metric || anchor.errorMm > LIMIT_MM || (anchor.errorPx ?? 0) > LIMIT_PX;
+    case 'tracking':
+      return false;
+  }
+}

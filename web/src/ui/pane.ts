@@ -45,7 +45,7 @@ export abstract class Pane {
 
   /** Axes and every mark in `view`; returns the marks. */
   protected drawMarks(view: View): readonly Mark[] {
-    const marks = allMarks(this.session.annotations);
+    const marks = allMarks(this.session.annotations, this.session.metric);
     this.painter.axes(axisStrokes(view));
     this.painter.marks(strokesOf(view, marks), this.accented);
     return marks;
@@ -66,6 +66,10 @@ export abstract class Pane {
     if (hover?.pane !== this.name || !hover.landing) return;
     const pixel = at(hover, view);
     if (!pixel) return;
-    this.painter.ring(pixel, ringRadius(view, hover.landing), landingWords(hover.landing));
+    this.painter.ring(
+      pixel,
+      ringRadius(view, hover.landing),
+      landingWords(view, hover.landing, this.session.metric),
+    );
   }
 }
