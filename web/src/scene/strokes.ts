@@ -1,7 +1,7 @@
 import { projectPolyline } from '../geometry/polyline';
 import { add, type Pixel, type Vec3 } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
-import { type Annotation, doNotTrust, type Shape } from '../session/types';
+import { type Annotation, doNotTrust, type Scale, type Shape } from '../session/types';
 import { charactersOf } from './characters';
 
 /** A polyline in pixels of a view, through its lens. */
@@ -45,11 +45,11 @@ export const colourOf = ({ colorRgba }: Pick<Annotation, 'colorRgba'>): string =
   `#${(colorRgba >>> 8).toString(16).padStart(6, '0')}`;
 
 /** Undefined where the annotation has no place in this map. */
-export function markOf(annotation: Annotation, metric: boolean): Mark | undefined {
+export function markOf(annotation: Annotation, scale: Scale): Mark | undefined {
   const { anchor, id, shape, text, sizeM, inkOffsetsM } = annotation;
   if (!anchor.pointInWorld || anchor.state === 'stopped') return undefined;
   const colour = colourOf(annotation);
-  const hollow = doNotTrust(anchor, metric);
+  const hollow = doNotTrust(anchor, scale);
   return { id, shape, text, sizeM, inkOffsetsM, colour, hollow, pointInWorld: anchor.pointInWorld };
 }
 

@@ -25,6 +25,7 @@ import {
   type Participant,
   type Pose,
   type Role,
+  type Scale,
 } from './types';
 import type { Statistics, View } from './types';
 
@@ -69,8 +70,7 @@ export class Session {
   readonly path: Pose[] = [];
   readonly clock = new ClockOffset();
   private readonly reader = new FrameReader();
-  /** When the stream last told something, pageNowMs() clock; 0: not yet. */
-  heardMs = 0;
+  private heardMs = 0; // when the stream last told something; 0: not yet
   private lastEventMs = 0;
   private acknowledger: Acknowledger | undefined;
   private readonly backoff = new Backoff();
@@ -102,9 +102,14 @@ export class Session {
     return this.joined?.sessionId ?? '';
   }
 
-  /** True where lengths are known in metres. */
-  get metric(): boolean {
-    return this.pose?.metric ?? false;
+  get scale(): Scale {
+    const { pose } = this;
+    return { metric: pose?.metric ?? false, eye: pose?.worldFromCamera.translation };
+  }
+
+  /** How old everything shown is [ms]; undefined while it is live, and before the first of it. */
+  get ageMs(): number | undefined {
+    return this.live || this.heardMs === 0 ? undefined : pageNowMs() - this.heardMs;
   }
 
   /** True when requests can be expected to be answered. */

@@ -1,7 +1,7 @@
 import type { Camera } from '../geometry/camera';
 import type { Covariance3 } from '../geometry/covariance';
 import type { Rigid3 } from '../geometry/rigid3';
-import type { Pixel, Vec3 } from '../geometry/vec3';
+import { distance, type Pixel, type Vec3 } from '../geometry/vec3';
 
 export type TrackingStatus =
   | 'unknown'
@@ -136,22 +136,43 @@ export type Link =
   | { readonly kind: 'reconnecting'; readonly reason: string; readonly sinceMs: number }
   | { readonly kind: 'refused'; readonly reason: string };
 
-/** Above these a mark is not to be trusted (annotation.proto, AnchorState). */
-export const LIMIT_MM = 50;
-export const LIMIT_PX = 10;
+/** What lengths mean now. */
+export interface Scale {
+  readonly metric: boolean; // world is in metres; false where that is not known
+  readonly eye: Vec3 | undefined; // the wearer's camera
+}
+
+/** Above these a mark is not to be trusted: as the server has them by default. */
+const LIMIT_MM = 50;
+const LIMIT_OF_DISTANCE = 0.02; // where that is more
+const LIMIT_PX = 10;
+
+export interface Excess {
+  readonly mm: boolean;
+  readonly px: boolean;
+}
+
+/** Which of its expected errors is above its limit; without scale there are no millimetres. */
+export function excessOf(anchor: Anchor, { metric, eye }: Scale): Excess {
+  const { pointInWorld, errorMm, errorPx } = anchor;
+  const away = eye && pointInWorld ? distance(eye, pointInWorld) : 0;
+  const limitMm = Math.max(LIMIT_MM, 1000 * LIMIT_OF_DISTANCE * away);
+  return { mm: metric && errorMm > limitMm, px: (errorPx ?? 0) > LIMIT_PX };
+}
 
 /**
- * An anchor whose place is not to be relied upon (drawn hollow and named so). While it is provisional
- * the server has not judged it yet: then its expected error does. Without scale there are no
- * millimetres, and a provisional depth is known to no better than a tenth: more than the server allows.
+ * An anchor whose place is not to be relied upon (drawn hollow and named so): as the server judges it,
+ * and while it is provisional and not judged yet, by its expected error.
  */
-export function doNotTrust(anchor: Anchor, metric: boolean): boolean {
+export function doNotTrust(anchor: Anchor, scale: Scale): boolean {
   switch (anchor.state) {
     case 'paused':
     case 'stopped':
       return true;
-    case 'provisional':
-      return !metric || anchor.errorMm > LIMIT_MM || (anchor.errorPx ?? 0) > LIMIT_PX;
+    case 'provisional': {
+      const { mm, px } = excessOf(anchor, scale);
+      return mm || px;
+    }
     case 'tracking':
       return false;
   }

@@ -1,12 +1,11 @@
 import { colourOf } from '../scene/strokes';
-import { pageNowMs } from '../session/clock';
 import type { Annotation } from '../session/types';
 import type { Session } from '../session/session';
 import type { AppState } from './app_state';
 import { h, icon, setClass, setText } from './dom';
 import { ICONS } from './icons';
 import { Palette } from './palette';
-import { type AnchorInput, anchorWords } from './words';
+import { anchorWords, dated } from './words';
 
 export interface AnnotationActions {
   select(id: string): void;
@@ -76,7 +75,8 @@ export class AnnotationsPanel {
   private updateRow(annotation: Annotation): void {
     const row = this.rows.get(annotation.id) ?? this.addRow(annotation);
     const selected = annotation.id === this.state.selectedId;
-    const words = anchorWords(annotation, this.told());
+    const { text, warn } = anchorWords(annotation, this.session.scale);
+    const words = { text: dated(text, this.session.ageMs), warn };
     const refusal = this.state.refusal(`annotation ${annotation.id}`);
     setText(row.title, annotation.text || annotation.shape);
     setText(row.state, refusal ?? words.text);
@@ -89,12 +89,6 @@ export class AnnotationsPanel {
     row.element.style.setProperty('--mark', colourOf(annotation));
     row.button.setAttribute('aria-pressed', String(selected));
     row.button.title = titleOf(annotation, words.text);
-  }
-
-  /** What the errors are worth: without connection they are old. */
-  private told(): AnchorInput {
-    const { metric, live, heardMs } = this.session;
-    return { metric, ageMs: live || heardMs === 0 ? undefined : pageNowMs() - heardMs };
   }
 
   private addRow(annotation: Annotation): Row {

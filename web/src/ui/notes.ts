@@ -10,6 +10,7 @@ import { KEEPS_OPEN, NoteEditor } from './note_editor';
 interface Spot {
   readonly landing: Landing;
   readonly sessionId: string; // whose frames and features `landing` names
+  readonly mapRevision: number | undefined; // the map whose coordinates its rays have
 }
 
 /** A note being typed. */
@@ -63,7 +64,8 @@ export class Notes {
     const { draft } = this;
     const text = draft ? this.editor.text : '';
     if (draft) this.put(undefined);
-    const spot = landing && { landing, sessionId: this.session.sessionId };
+    const { sessionId, pose } = this.session;
+    const spot = landing && { landing, sessionId, mapRevision: pose?.mapRevision };
     const problem = spot ? '' : `Not placed: ${whyNot} Click where it belongs.`;
     this.put({ id: '', text, problem, spot, pendingId: spot ? this.showMark(landing) : '' });
     if (spot) this.hold(landing);
@@ -110,9 +112,16 @@ export class Notes {
     if (!this.session.live) return 'Not kept: no connection to the server. Enter tries again.';
     if (id) return '';
     if (!spot) return problem;
-    return spot.sessionId === this.session.sessionId
-      ? ''
-      : 'Not placed: the connection was begun anew since the click. Click where it belongs.';
+    if (spot.sessionId !== this.session.sessionId) {
+      return 'Not placed: the connection was begun anew since the click. Click where it belongs.';
+    }
+    return spot.landing.target.kind === 'ray' && !this.sameMap(spot)
+      ? 'Not placed: the map has changed since the click. Click where it belongs.'
+      : '';
+  }
+
+  private sameMap({ mapRevision }: Spot): boolean {
+    return mapRevision === this.session.pose?.mapRevision;
   }
 
   private async send(draft: Draft): Promise<void> {
@@ -122,7 +131,8 @@ export class Notes {
       if (id) {
         await edits.setText(id, text);
       } else if (spot) {
-        const { target, later, pointInWorld } = spot.landing;
+        const { target, pointInWorld } = spot.landing;
+        const later = this.sameMap(spot) ? spot.landing.later : undefined;
         const { colorRgba } = state;
         const guess = { guessInWorld: pointInWorld, target, later };
         const placed = await edits.place({ shape: 'note', text, colorRgba, ...guess });

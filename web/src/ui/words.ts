@@ -3,10 +3,10 @@ import { MAX_STREAMS } from '../session/tabs';
 import {
   type Annotation,
   doNotTrust,
+  excessOf,
   type Link,
-  LIMIT_MM,
-  LIMIT_PX,
   type Pose,
+  type Scale,
 } from '../session/types';
 
 /** The state of things in words, with what to do about it. Never colour alone: a shape as well. */
@@ -109,41 +109,23 @@ export function presenceWords(participants: readonly { readonly role: string }[]
   return counts.filter(Boolean).join(', ');
 }
 
-export interface AnchorInput {
-  /** World is in metres; false where that is not known. */
-  readonly metric: boolean;
-  /** Age of what is told [ms] while nothing new is heard of; undefined: live. */
-  readonly ageMs?: number | undefined;
-}
+/** With its age, if it is old. */
+export const dated = (text: string, ageMs: number | undefined): string =>
+  ageMs === undefined ? text : `${text} · as of ${spanWords(ageMs)} ago`;
 
-/** Error of an anchor: "0.8 px · 3 mm", or why it is not to be trusted; with its age if it is old. */
-export function anchorWords(
-  annotation: Annotation,
-  { metric, ageMs }: AnchorInput,
-): { text: string; warn: boolean } {
-  const { text, warn } = anchorNow(annotation, metric);
-  return { text: ageMs === undefined ? text : `${text} · as of ${spanWords(ageMs)} ago`, warn };
-}
-
-function anchorNow({ anchor }: Annotation, metric: boolean): { text: string; warn: boolean } {
+/** Error of an anchor: "0.8 px · 3 mm", or why it is not to be trusted. */
+export function anchorWords({ anchor }: Annotation, scale: Scale): { text: string; warn: boolean } {
   const { state, reason, errorPx, errorMm, pointInWorld } = anchor;
+  const { metric } = scale;
   const why = placeable(reason, metric);
   if (state === 'paused') return { text: `do not trust${why ? `: ${why}` : ''}`, warn: true };
   if (state === 'stopped') return { text: `stopped${why ? `: ${why}` : ''}`, warn: true };
   if (!pointInWorld) return { text: 'place not known', warn: true };
   const px = errorPx === undefined ? 'out of view' : `${errorPx.toFixed(1)} px`;
   const size = metric ? ` · ${millimetres(errorMm)}` : ' · scale unknown';
-  if (!doNotTrust(anchor, metric)) return { text: `${px}${size}`, warn: false };
-  return {
-    text: `do not trust: ${limitWords(anchor, metric) || why || 'not certain yet'}`,
-    warn: true,
-  };
-}
-
-function limitWords({ errorMm, errorPx }: Annotation['anchor'], metric: boolean): string {
-  if (metric && errorMm > LIMIT_MM) return `expected error ${millimetres(errorMm)}`;
-  if (errorPx !== undefined && errorPx > LIMIT_PX) return `expected error ${errorPx.toFixed(0)} px`;
-  return '';
+  if (!doNotTrust(anchor, scale)) return { text: `${px}${size}`, warn: false };
+  const error = excessOf(anchor, scale).mm ? millimetres(errorMm) : px;
+  return { text: `do not trust: expected error ${error}`, warn: true };
 }
 
 /** The server's reason, without what nobody can do here, and without lengths where there is no scale. */

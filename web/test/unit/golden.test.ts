@@ -70,7 +70,7 @@ const marks = golden.annotations.map((entry) => {
       reason: '',
     },
   };
-  return markOf(annotation, true)!;
+  return markOf(annotation, { metric: true, eye: undefined })!;
 });
 
 /** A label may be cut on either side: then one begins as the other does. */

@@ -10,7 +10,10 @@ import { bytesOf, cleanText, roomWords } from '../../src/tools/note_text';
 import { landingInMap, landingInVideo, landingWords, ringRadius } from '../../src/tools/landing';
 import { pickNearest } from '../../src/tools/pick';
 import { COMMANDS, controlOf, HEAD_COMMANDS, TOOLS } from '../../src/tools/tools';
-import { anchorWords, crowdedWords, presenceWords, statusWords } from '../../src/ui/words';
+import { anchorWords, crowdedWords, dated, presenceWords, statusWords } from '../../src/ui/words';
+
+const METRIC = { metric: true, eye: IDENTITY.translation };
+const NO_SCALE = { ...METRIC, metric: false };
 
 const camera = new Camera({
   model: 'pinhole',
@@ -130,21 +133,21 @@ describe('strokes', () => {
     const edges = cubeEdges({ x: 1, y: 2, z: 3 }, 0.05);
     expect(edges).toHaveLength(12);
     for (const [a, b] of edges) expect(distance(a, b)).toBeCloseTo(0.05, 12);
-    const { strokes } = strokesOf(view, [markOf(annotation, true)!]);
+    const { strokes } = strokesOf(view, [markOf(annotation, METRIC)!]);
     const points = strokes.flatMap((stroke) => stroke.points);
     const mean = points.reduce((sum, p) => sum + p.u, 0) / points.length;
     expect(mean).toBeCloseTo(projectPoint(view, { x: 0, y: 0, z: 1 })?.u ?? NaN, 1);
   });
 
   it('draws hollow, and names, what is not to be trusted', () => {
-    const { strokes, labels } = strokesOf(view, [markOf(paused, true)!]);
+    const { strokes, labels } = strokesOf(view, [markOf(paused, METRIC)!]);
     expect(strokes.every((stroke) => stroke.hollow)).toBe(true);
     expect(labels.map((label) => label.text)).toEqual(['do not trust']);
   });
 
   it('cuts a label between characters only, and keeps all of it beside', () => {
     const text = `${'👩‍🔧'.repeat(39)} prüfen!`;
-    const [label] = strokesOf(view, [markOf({ ...annotation, text }, true)!]).labels;
+    const [label] = strokesOf(view, [markOf({ ...annotation, text }, METRIC)!]).labels;
     expect(label?.text).toBe(`${'👩‍🔧'.repeat(39)}…`);
     expect(label?.whole).toBe(text);
   });
@@ -183,50 +186,52 @@ describe('the text of a note', () => {
 
 describe('words', () => {
   it('gives an anchor its error, or the reason not to trust it', () => {
-    const metric = { metric: true };
-    expect(anchorWords(annotation, metric)).toEqual({ text: '0.8 px · 3.0 mm', warn: false });
-    expect(anchorWords(annotation, { metric: false }).text).toBe('0.8 px · scale unknown');
-    expect(anchorWords(paused, metric)).toEqual({
+    expect(anchorWords(annotation, METRIC)).toEqual({ text: '0.8 px · 3.0 mm', warn: false });
+    expect(anchorWords(annotation, NO_SCALE).text).toBe('0.8 px · scale unknown');
+    expect(anchorWords(paused, METRIC)).toEqual({
       text: 'do not trust: tracking lost',
       warn: true,
     });
   });
 
   it('date what is told while nothing new is heard', () => {
-    expect(anchorWords(annotation, { metric: true, ageMs: 12_300 }).text).toBe(
-      '0.8 px · 3.0 mm · as of 12 s ago',
-    );
-    expect(anchorWords(paused, { metric: true, ageMs: 600_000 }).text).toBe(
-      'do not trust: tracking lost · as of 10 min ago',
-    );
+    const { text } = anchorWords(annotation, METRIC);
+    expect(dated(text, undefined)).toBe('0.8 px · 3.0 mm');
+    expect(dated(text, 12_300)).toBe('0.8 px · 3.0 mm · as of 12 s ago');
+    expect(dated(text, 600_000)).toBe('0.8 px · 3.0 mm · as of 10 min ago');
   });
 
   it('do not trust a provisional mark above its limit, nor give its error in millions', () => {
     const { errorPx, errorMm } = { errorPx: 4, errorMm: 23_087 };
     const wide = withAnchor({ state: 'provisional', errorPx, errorMm });
-    expect(anchorWords(wide, { metric: true })).toEqual({
+    expect(anchorWords(wide, METRIC)).toEqual({
       text: 'do not trust: expected error 23.1 m',
       warn: true,
     });
-    expect(markOf(wide, true)?.hollow).toBe(true);
+    expect(markOf(wide, METRIC)?.hollow).toBe(true);
     const coarse = withAnchor({ state: 'provisional', errorPx: 14, errorMm: 4 });
-    expect(anchorWords(coarse, { metric: true }).text).toBe('do not trust: expected error 14 px');
+    expect(anchorWords(coarse, METRIC).text).toBe('do not trust: expected error 14.0 px');
     const young = withAnchor({ state: 'provisional', errorPx: 2, errorMm: 9 });
-    expect(anchorWords(young, { metric: true })).toEqual({ text: '2.0 px · 9.0 mm', warn: false });
-    expect(markOf(young, true)?.hollow).toBe(false);
+    expect(anchorWords(young, METRIC)).toEqual({ text: '2.0 px · 9.0 mm', warn: false });
+    expect(markOf(young, METRIC)?.hollow).toBe(false);
+    // Far away the server allows a share of the distance: 2 % of 4 m.
+    const pointInWorld = { x: 0, y: 0, z: 4 };
+    const far = withAnchor({ state: 'provisional', errorPx, errorMm: 79, pointInWorld });
+    expect(markOf(far, METRIC)?.hollow).toBe(false);
+    expect(markOf({ ...far, anchor: { ...far.anchor, errorMm: 81 } }, METRIC)?.hollow).toBe(true);
   });
 
   it('give no millimetres without scale, whoever says them', () => {
     const reason = 'expected error 700 mm is above 50 mm';
     for (const state of ['provisional', 'tracking', 'paused'] as const) {
-      const { text } = anchorWords(withAnchor({ state, errorMm: 700, reason }), { metric: false });
+      const { text } = anchorWords(withAnchor({ state, errorMm: 700, reason }), NO_SCALE);
       expect(text).not.toMatch(/\bmm\b|\bcm\b|\d m\b/);
     }
   });
 
   it('ask for nothing that cannot be done here', () => {
     const reason = 'its place is not known in this map: it was placed in another one; move it';
-    const { text } = anchorWords(withAnchor({ state: 'paused', reason }), { metric: true });
+    const { text } = anchorWords(withAnchor({ state: 'paused', reason }), METRIC);
     expect(text).not.toContain('move it');
   });
 
