@@ -5,7 +5,7 @@ import type { AppState } from './app_state';
 import { h, icon, setClass, setText } from './dom';
 import { ICONS } from './icons';
 import { Palette } from './palette';
-import { anchorWords, dated } from './words';
+import { anchorWords, dated, shapeWord } from './words';
 
 export interface AnnotationActions {
   select(id: string): void;
@@ -78,7 +78,7 @@ export class AnnotationsPanel {
     const { text, warn } = anchorWords(annotation, this.session.scale);
     const words = { text: dated(text, this.session.ageMs), warn };
     const refusal = this.state.refusal(`annotation ${annotation.id}`);
-    setText(row.title, annotation.text || annotation.shape);
+    setText(row.title, annotation.text || shapeWord(annotation.shape));
     setText(row.state, refusal ?? words.text);
     const provisional = annotation.anchor.state === 'provisional';
     setText(row.by, provisional ? 'provisional' : annotation.author);
@@ -105,11 +105,11 @@ export class AnnotationsPanel {
     button.addEventListener('click', () => this.actions.select(id));
     button.addEventListener('dblclick', () => this.actions.startEditing(id));
     const remove = h('button', { class: 'remove', type: 'button', title: 'Delete (Del)' });
-    remove.setAttribute('aria-label', `Delete ${shape}`);
+    remove.setAttribute('aria-label', `Delete ${shapeWord(shape)}`);
     remove.append(icon('M5.5 5.5l9 9M14.5 5.5l-9 9'));
     remove.addEventListener('click', () => this.actions.remove(id));
     const look = h('button', { class: 'look', type: 'button', title: 'Turn the camera to it' });
-    look.setAttribute('aria-label', `Turn the camera to this ${shape}`);
+    look.setAttribute('aria-label', `Turn the camera to this ${shapeWord(shape)}`);
     look.append(icon(ICONS.gaze));
     look.addEventListener('click', () => this.actions.lookAt(id));
     const element = h('li', { 'data-id': id, 'data-shape': shape }, button, look, remove);
@@ -124,4 +124,4 @@ export class AnnotationsPanel {
 
 /** All of it, whatever the row has room for. */
 const titleOf = ({ shape, author, text }: Annotation, state: string): string =>
-  [text, `${shape} by ${author}`, state].filter(Boolean).join('\n');
+  [text, `${shapeWord(shape)} by ${author}`, state].filter(Boolean).join('\n');

@@ -1,3 +1,4 @@
+import { charactersOf } from '../scene/characters';
 import { type Gaze, type HeadAngles, ownHandover } from '../session/gaze';
 import type { Lease } from '../session/gaze_pilot';
 import type { Annotation, Participant } from '../session/types';
@@ -66,7 +67,10 @@ export function targetWords({ gaze, annotation }: GazeInput): string {
 
 const SHAPE_WORDS = { cube: 'a cube', note: 'a note', arrow: 'an arrow', ink: 'a stroke' } as const;
 
-const shorten = (text: string): string => (text.length > 24 ? `${text.slice(0, 23)}…` : text);
+function shorten(text: string): string {
+  const characters = charactersOf(text);
+  return characters.length > 24 ? `${characters.slice(0, 23).join('')}…` : text;
+}
 
 export function gazeWords(input: GazeInput): GazeWords {
   const { gaze } = input;

@@ -20,7 +20,7 @@ export function startPage(
 ): void {
   const player = new Player();
   const kept = new KeptSession(tabStorage(), options.role);
-  const tabs = new Tabs(new BroadcastChannel('saccade'), newUuid(), pageNowMs());
+  const tabs = new Tabs(new BroadcastChannel('saccade'), newUuid(), openedMs(tabStorage()));
   const session = new Session(createClients(location.origin), { ...options, kept, tabs }, player);
   player.attach(session);
   const page = makePage(session, player);
@@ -37,4 +37,19 @@ export function startPage(
     if (event.persisted) location.reload();
   });
   void session.run(leaving.signal);
+}
+
+const OPENED = 'saccade.opened';
+
+/** When this tab was opened: a reload keeps its place among the tabs of this browser. */
+function openedMs(storage: ReturnType<typeof tabStorage>): number {
+  const [entry] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
+  const kept = entry?.type === 'reload' ? Number(storage.getItem(OPENED)) : 0;
+  const opened = kept > 0 ? kept : pageNowMs();
+  try {
+    storage.setItem(OPENED, String(opened));
+  } catch {
+    // Full: then a reload goes to the end of the queue.
+  }
+  return opened;
 }

@@ -7,6 +7,7 @@ import {
   type Link,
   type Pose,
   type Scale,
+  type Shape,
 } from '../session/types';
 
 /** The state of things in words, with what to do about it. Never colour alone: a shape as well. */
@@ -100,11 +101,18 @@ function trackingWords(pose: Pose | undefined): StatusWords {
   }
 }
 
+/** "1 frame", "2 frames". */
+export const counted = (count: number, thing: string): string =>
+  `${count} ${thing}${count === 1 ? '' : 's'}`;
+
+/** What a person calls a mark of this shape. */
+export const shapeWord = (shape: Shape): string => (shape === 'ink' ? 'stroke' : shape);
+
 /** "2 experts, 1 wearer". */
 export function presenceWords(participants: readonly { readonly role: string }[]): string {
   const counts = ['expert', 'wearer', 'viewer'].map((role) => {
     const count = participants.filter((participant) => participant.role === role).length;
-    return count === 0 ? '' : `${count} ${role}${count === 1 ? '' : 's'}`;
+    return count === 0 ? '' : counted(count, role);
   });
   return counts.filter(Boolean).join(', ');
 }
