@@ -177,7 +177,11 @@ bool Subscription::FillVideo(Timestamp now_ns, v1::Event& event) {
   if (!Has(v1::TOPIC_VIDEO)) return false;
   const std::shared_ptr<const VideoPacket> packet = video_.Take(now_ns);
   if (packet == nullptr) return false;
-  *event.mutable_access_unit() = AccessUnitToProto(*packet, now_ns);
+  v1::AccessUnit& unit = *event.mutable_access_unit() = AccessUnitToProto(*packet, now_ns);
+  // Of the packet's own frame, not of the newest: a dot belongs to the picture it was measured in.
+  if (Has(v1::TOPIC_MAP)) {
+    *unit.mutable_features() = wire::ToProtoFeatures(*packet->tracked.snapshot);
+  }
   return true;
 }
 
