@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+
 #include "server/pipeline/busy.hpp"
 
 namespace saccade {
@@ -20,6 +22,18 @@ absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const cha
 const RpcLimits::Kind& RpcLimits::of(Toll toll) const {
   const Kind* const kinds[kTolls] = {&join, &subscribe, &edit, &reset, &still, &gaze, &read};
   return *kinds[static_cast<int>(toll)];
+}
+
+RpcLimits RpcLimits::Scaled(double factor) const {
+  RpcLimits scaled = *this;
+  for (Kind* kind : {&scaled.join, &scaled.subscribe, &scaled.edit, &scaled.reset, &scaled.still,
+                     &scaled.gaze, &scaled.read}) {
+    for (RateLimit* limit : {&kind->courtesy, &kind->session, &kind->peer, &kind->server}) {
+      limit->per_s *= factor;
+      limit->burst = std::max(1.0, limit->burst * factor);
+    }
+  }
+  return scaled;
 }
 
 Admission::Admission(const RpcLimits& limits) {

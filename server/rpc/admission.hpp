@@ -34,6 +34,8 @@ struct RpcLimits {
   Kind read{{}, {}, {100, 500}, {}};                 // up to a megabyte each
 
   const Kind& of(Toll toll) const;
+  /// Every rate and burst times `factor`; 0: no limits, for laboratories.
+  RpcLimits Scaled(double factor) const;
 };
 
 /// Refuses what comes too often. Thread safe.
