@@ -75,6 +75,8 @@ export default tseslint.config(
         Buffer: 'readonly',
         document: 'readonly',
         window: 'readonly',
+        sessionStorage: 'readonly',
+        AbortController: 'readonly',
       },
     },
   },

@@ -13,6 +13,7 @@ find_package(SQLite3 REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(OpenH264 REQUIRED IMPORTED_TARGET openh264)
 pkg_check_modules(OSMesa REQUIRED IMPORTED_TARGET osmesa)
+pkg_check_modules(TextDrawing REQUIRED IMPORTED_TARGET freetype2 harfbuzz fribidi fontconfig)
 
 # OpenCV by module: libopencv-dev, which holds OpenCVConfig.cmake, would pull VTK and videoio in.
 find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)

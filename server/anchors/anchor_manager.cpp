@@ -126,7 +126,11 @@ std::vector<AnnotationChange> AnchorManager::TakeRefinements() {
     }
     const bool differs = (anchor.point_in_world - record.stored_point).norm() > kStoreAgainM ||
                          anchor.error_m < 0.5 * record.stored_error_m;
-    if (!record.place.attached || anchor.state == AnchorState::kPaused || !differs ||
+    // What is new and not trusted yet is refined all the same; what was sure once waits until it is
+    // sure again.
+    const bool unsure = newest_->snapshot().status != TrackingStatus::kTracking ||
+                        (record.place.was_tracking && anchor.state == AnchorState::kPaused);
+    if (!record.place.attached || unsure || !differs ||
         std::abs(now_ns - record.stored_time_ns) < kStoreAgainNs) {
       continue;
     }

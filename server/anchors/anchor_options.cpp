@@ -41,7 +41,10 @@ absl::Status AnchorOptions::Validate() const {
         positive("median_depth_sigma", median_depth_sigma),
         positive("click_sigma_px", click_sigma_px), positive("tracking_sigma", tracking_sigma),
         positive("pause_sigma_m", pause_sigma_m), positive("pause_sigma_px", pause_sigma_px),
-        positive("moved_m", moved_m), positive("refine_time_s", refine_time_s)}) {
+        positive("pause_sigma_no_scale", pause_sigma_no_scale),
+        positive("resume_share", resume_share), positive("resume_time_s", resume_time_s),
+        positive("far_depth_sigma", far_depth_sigma), positive("moved_m", moved_m),
+        positive("refine_time_s", refine_time_s)}) {
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

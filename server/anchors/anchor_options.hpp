@@ -21,10 +21,13 @@ struct AnchorOptions {
   double tracking_sigma = 0.1;            // provisional until sigma / depth is below
   double pause_sigma_m = 0.05;            // "do not trust" above...
   double pause_sigma_relative = 0.02;     // ...unless below this share of the distance
+  double pause_sigma_no_scale = 0.05;     // the same where there are no metres
   double pause_sigma_px = 10.0;
-  double resume_share = 0.8;   // a paused anchor resumes below this share of the limit
-  double moved_m = 0.02;       // a jump above this is reported
-  double refine_time_s = 0.5;  // a better depth is taken over this slowly: nothing jumps
+  double resume_share = 0.8;     // a paused anchor resumes below this share of the limit at once...
+  double resume_time_s = 1.0;    // ...or after so long below the limit
+  double far_depth_sigma = 1.0;  // share of depth, where nothing is near the ray: a mere guess
+  double moved_m = 0.02;         // a jump above this is reported
+  double refine_time_s = 0.5;    // a better depth is taken over this slowly: nothing jumps
   // Quotas: what stands at one time. A long day with several experts leaves some hundred marks and
   // strokes of some hundred points. Everything together is 7 MB on the wire: a page that joins has
   // it in 6 s at 10 Mbit/s, in parts, beside the video. (A stroke has at most 2000 points and a

@@ -60,9 +60,10 @@ struct AnchorPlace {
   std::optional<Eigen::Matrix3d> seed_covariance;
   Timestamp placed_ns = 0;
   Timestamp last_selected_ns = 0;  // members were last compared with the rest of the map
-  bool was_tracking = false;       // has been sure once: now TRACKING or PAUSED, not PROVISIONAL
+  bool was_tracking = false;       // has been sure once: now never PROVISIONAL again
   double seen_s = 0;               // since then a member was measured for so long
   bool paused = false;             // by its own error (hysteresis)
+  Timestamp above_ns = 0;          // while paused: when that was last above its limit
   Timestamp last_time_ns = 0;
 };
 

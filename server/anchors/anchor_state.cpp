@@ -1,9 +1,14 @@
 #include "server/anchors/anchor_state.hpp"
 
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
+
+#include "shared/scene/length_text.hpp"
 
 namespace saccade {
 namespace {
@@ -29,8 +34,55 @@ void DescribePixel(const MapView& map, const CameraModel& camera, const PlaceEst
 
 double PauseLimit(const MapSnapshot& snapshot, const AnchorOptions& options,
                   const AnchorPlace& place) {
-  if (!snapshot.metric) return 0.05 * place.distance_m;  // no metres to speak of
+  if (!snapshot.metric) return options.pause_sigma_no_scale * place.distance_m;
   return std::max(options.pause_sigma_m, options.pause_sigma_relative * place.distance_m);
+}
+
+/// An expected error, and what it may be.
+struct Excess {
+  double error = 0, limit = 0;
+  bool above = false;
+};
+
+/// "56 mm is above 50 mm": two numbers that differ as they are read, with as many digits as that
+/// takes.
+std::string Compare(double error, double limit, const char* unit, const char* limit_of = "") {
+  const char* const word = error > limit ? "above" : "below";
+  for (const int digits : {0, 1, 2}) {
+    const std::string a = absl::StrFormat("%.*f", digits, error);
+    const std::string b = absl::StrFormat("%.*f", digits, limit);
+    if (a != b) return absl::StrFormat("%s %s is %s %s %s%s", a, unit, word, b, unit, limit_of);
+  }
+  return absl::StrFormat("is just %s %g %s%s", word, limit, unit, limit_of);
+}
+
+std::string Compare(const Excess& metres, const MapSnapshot& snapshot, const AnchorPlace& place) {
+  if (!snapshot.metric) {
+    return Compare(1e2 * metres.error / place.distance_m, 1e2 * metres.limit / place.distance_m,
+                   "%", " of its distance");
+  }
+  const std::string error = LengthText(metres.error), limit = LengthText(metres.limit);
+  if (error == limit) return Compare(1e3 * metres.error, 1e3 * metres.limit, "mm");
+  return absl::StrCat(error, " is ", metres.above ? "above " : "below ", limit);
+}
+
+/// Not trusted from the first frame above a limit on; again at once well below it, or after it
+/// stayed below for a while. An error that settles just below the limit is one that a mark which
+/// was never above it may have, too.
+void UpdatePaused(const MapSnapshot& snapshot, const AnchorOptions& options,
+                  std::span<const Excess> all, AnchorPlace& place) {
+  const auto is_above = [](const Excess& one) { return one.above; };
+  const auto is_well_below = [&options](const Excess& one) {
+    return one.error <= options.resume_share * one.limit;
+  };
+  const Timestamp now_ns = snapshot.capture_time_ns;
+  if (std::any_of(all.begin(), all.end(), is_above)) {
+    place.paused = true;
+    place.above_ns = now_ns;
+  } else if (place.paused) {
+    const bool stayed = std::abs(Seconds(now_ns - place.above_ns)) >= options.resume_time_s;
+    place.paused = !stayed && !std::all_of(all.begin(), all.end(), is_well_below);
+  }
 }
 
 /// True once a member is near enough to vouch for the place (after a restart the map grows back).
@@ -41,7 +93,7 @@ bool HasNearMember(const AnchorPlace& place) {
   return std::any_of(place.members.begin(), place.members.end(), near);
 }
 
-/// One word on what is wrong with the tracker itself; empty if nothing.
+/// What is wrong with the tracker itself, in words; empty if nothing.
 std::string TrackerTrouble(TrackingStatus status) {
   switch (status) {
     case TrackingStatus::kInitialising:
@@ -53,6 +105,41 @@ std::string TrackerTrouble(TrackingStatus status) {
     default:
       return "";
   }
+}
+
+/// What makes an anchor's depth better known; where nothing can, that it has to be placed again.
+std::string Remedy(const AnchorPlace& place) {
+  const bool guessed = place.method == AnchorMethod::kMedianDepth && !place.seed;
+  if (place.was_tracking) return "look at it from nearby";
+  return guessed ? "its depth is a guess; place it again on something that the map has"
+                 : "move the camera sideways";
+}
+
+std::string PausedReason(const MapSnapshot& snapshot, const Excess& metres, const Excess& pixels,
+                         const AnchorPlace& place) {
+  if (!metres.above && !pixels.above) {
+    const bool by_metres = metres.error * pixels.limit >= pixels.error * metres.limit;
+    return absl::StrCat(
+        "expected error ",
+        by_metres ? Compare(metres, snapshot, place) : Compare(pixels.error, pixels.limit, "px"),
+        " again: trusted if it stays there");
+  }
+  // A pose that is only predicted drifts: its figure says nothing of the mark.
+  if (snapshot.status == TrackingStatus::kCoasting) {
+    return "expected error is not known while coasting: show a place seen before";
+  }
+  return absl::StrCat(
+      "expected error ",
+      metres.above ? Compare(metres, snapshot, place) : Compare(pixels.error, pixels.limit, "px"),
+      ": ", Remedy(place));
+}
+
+std::string ProvisionalReason(double relative, const AnchorOptions& options,
+                              const AnchorPlace& place) {
+  if (!HasNearMember(place)) return "no mapped feature is near it yet: look around there";
+  if (relative < options.tracking_sigma) return "";
+  return absl::StrCat("its depth is known to ", absl::StrFormat("%.0f %%: ", 1e2 * relative),
+                      Remedy(place));
 }
 
 }  // namespace
@@ -67,33 +154,25 @@ Anchor DescribeAnchor(const MapView& map, const CameraModel& camera, const Ancho
   anchor.error_m = LargestSigma(estimate.covariance_in_camera);
   DescribePixel(map, camera, estimate, anchor);
 
-  const double limit_m = PauseLimit(snapshot, options, place);
-  const double share = place.paused ? options.resume_share : 1.0;
-  const bool too_far_off = anchor.error_m > share * limit_m;
-  const bool too_many_px = anchor.error_px && *anchor.error_px > share * options.pause_sigma_px;
+  Excess metres{anchor.error_m, PauseLimit(snapshot, options, place)};
+  Excess pixels{anchor.error_px.value_or(0.0), options.pause_sigma_px};
+  for (Excess* one : {&metres, &pixels}) one->above = !(one->error <= one->limit);
   const double relative = anchor.error_m / place.distance_m;
   const std::string trouble = TrackerTrouble(snapshot.status);
+  UpdatePaused(snapshot, options, std::array{metres, pixels}, place);
   if (!place.was_tracking && trouble.empty()) {
-    place.was_tracking =
-        relative < options.tracking_sigma && !too_far_off && !too_many_px && HasNearMember(place);
+    place.was_tracking = relative < options.tracking_sigma && !place.paused && HasNearMember(place);
   }
-  place.paused = place.was_tracking && (too_far_off || too_many_px);
 
   if (!trouble.empty()) {
     anchor.state = AnchorState::kPaused;
     anchor.reason = trouble;
+  } else if (place.paused) {  // new ones, too: who is above the limit is not to be trusted
+    anchor.state = AnchorState::kPaused;
+    anchor.reason = PausedReason(snapshot, metres, pixels, place);
   } else if (!place.was_tracking) {
     anchor.state = AnchorState::kProvisional;
-    anchor.reason = HasNearMember(place)
-                        ? absl::StrFormat("its depth is known to %.0f %%: move the camera sideways",
-                                          100.0 * relative)
-                        : "no mapped feature is near it yet: look around there";
-  } else if (place.paused) {
-    anchor.state = AnchorState::kPaused;
-    anchor.reason = too_far_off ? absl::StrFormat("expected error %.0f mm is above %.0f mm",
-                                                  1e3 * anchor.error_m, 1e3 * limit_m)
-                                : absl::StrFormat("expected error %.0f px is above %.0f px",
-                                                  *anchor.error_px, options.pause_sigma_px);
+    anchor.reason = ProvisionalReason(relative, options, place);
   } else {
     anchor.state = AnchorState::kTracking;
   }
@@ -106,12 +185,15 @@ Anchor DescribeDetached(const MapSnapshot& snapshot, const AnchorOptions& option
   last.place_known = false;
   last.error_px.reset();
   last.pixel.reset();
+  const std::string unknown = "its place is not known in this map";
   if (place.world_key.empty() || place.world_key != options.world_key) {
-    last.reason = "its place is not known in this map: it was placed in another one; move it";
+    last.reason = unknown + ": it belongs to another one; delete it, or place it again";
   } else if (!snapshot.metric) {
-    last.reason = "its place is not known in this map yet: show the target";
+    last.reason = unknown + " yet: show the target";
   } else {
-    last.reason = "its place is not known in this map yet: " + TrackerTrouble(snapshot.status);
+    const std::string trouble = TrackerTrouble(snapshot.status);
+    last.reason =
+        unknown + " yet: " + (trouble.empty() ? "wait until the camera is tracked again" : trouble);
   }
   return last;
 }

@@ -211,7 +211,7 @@ SurfaceDepth FromFeature(const InverseDepthSample& sample, double radians_per_px
   return depth;
 }
 
-SurfaceDepth FromMedian(std::vector<InverseDepthSample> samples, const AnchorOptions& options) {
+SurfaceDepth FromMedian(std::vector<InverseDepthSample> samples, double relative_sigma) {
   std::sort(samples.begin(), samples.end(),
             [](const auto& a, const auto& b) { return a.rho < b.rho; });
   const auto weight = [](const InverseDepthSample& sample) {
@@ -226,7 +226,7 @@ SurfaceDepth FromMedian(std::vector<InverseDepthSample> samples, const AnchorOpt
     below += weight(sample);
     if (below < 0.5 * total) continue;
     depth.depth_m = 1.0 / sample.rho;
-    depth.sigma_m = options.median_depth_sigma * depth.depth_m;
+    depth.sigma_m = relative_sigma * depth.depth_m;
     break;
   }
   return depth;
@@ -243,7 +243,8 @@ std::optional<SurfaceDepth> EstimateDepth(const std::vector<SurfaceSample>& samp
   for (const InverseDepthSample& sample : all) {
     if (sample.radius < kRadiusRad && near.size() < kMaxSamples) near.push_back(sample);
   }
-  if (near.empty()) return FromMedian(all, options);
+  // Of a surface that nobody has seen a point of, the rest of the room says next to nothing.
+  if (near.empty()) return FromMedian(all, options.far_depth_sigma);
 
   const auto nearest =
       std::find_if(near.begin(), near.end(), [](const auto& sample) { return sample.depth_known; });
@@ -264,7 +265,7 @@ std::optional<SurfaceDepth> EstimateDepth(const std::vector<SurfaceSample>& samp
     return depth;
   }
   if (nearest_px < options.feature_radius_px) return FromFeature(*nearest, radians_per_px);
-  return FromMedian(near, options);
+  return FromMedian(near, options.median_depth_sigma);
 }
 
 }  // namespace saccade

@@ -29,7 +29,8 @@ struct SurfaceDepth {
 /// Finds the depth along a ray from the features round it, best first:
 ///   a robust plane through at least three of them that surround the ray,
 ///   the nearest one within options.feature_radius_px,
-///   the weighted median of what is near, with sigma options.median_depth_sigma.
+///   the weighted median of what is near, with sigma options.median_depth_sigma,
+///   the weighted median of everything, with sigma options.far_depth_sigma.
 /// A plane predicts at the ray itself, so it beats a feature 15 px away that may lie on something
 /// else; a feature within 6 px that contradicts the plane beats it. See README.md.
 /// Nothing if no sample has a usable depth.

@@ -158,7 +158,7 @@ void Engine::Track(Frame frame) {
   last_->tracked.stages.tracked_ns = end_ns;
   tracked_ns_ = end_ns;
   track_ms_.Add(end_ns, 1e-6 * static_cast<double>(end_ns - begin_ns));
-  Publish();
+  Publish(/*new_frame=*/true);
 }
 
 void Engine::TellGaze(const Frame& frame) {
@@ -194,14 +194,14 @@ void Engine::Settle() {
   book_->OnSnapshot(last_->tracked.snapshot, *last_->tracked.camera);
   const bool same = last_->tracked.annotations == book_->Latest() &&
                     last_->tracked.snapshot == published_snapshot_;
-  if (!same) Publish();
+  if (!same) Publish(/*new_frame=*/false);
 }
 
-void Engine::Publish() {
+void Engine::Publish(bool new_frame) {
   last_->tracked.annotations = book_->Latest();
   published_snapshot_ = last_->tracked.snapshot;
   sink_.OnTracked(last_->tracked);
-  for (const auto& view : views_) view->Post(*last_);
+  for (const auto& view : views_) new_frame ? view->Post(*last_) : view->Redraw(*last_);
 }
 
 void Engine::Execute(Command command) {
@@ -242,6 +242,7 @@ void Engine::RunClock(std::stop_token stop) {
   while (!never.wait_for(lock, stop, std::chrono::seconds(1), [] { return false; })) {
     if (stop.stop_requested()) return;
     sink_.OnStatistics(Statistics());
+    for (const auto& view : views_) view->Tick();
     if (MonotonicNow() - tracked_ns_ > kSourceQuiet) inbox_.PutNewestIfEmpty({});
   }
 }
@@ -251,6 +252,10 @@ absl::Status Engine::Submit(Command command) { return inbox_.Submit(std::move(co
 std::shared_ptr<const AnnotationList> Engine::annotations() const {
   const std::lock_guard lock(book_gone_mutex_);
   return book_ ? book_->Latest() : std::make_shared<const AnnotationList>();
+}
+
+void Engine::SetPresence(std::shared_ptr<const ParticipantSet> present) {
+  if (gaze_) gaze_->SetPresence(std::move(present));
 }
 
 void Engine::SetVideoDemand(VideoView view, bool wanted) {

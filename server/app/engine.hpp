@@ -64,6 +64,7 @@ class Engine : public Backend {
   std::shared_ptr<const GazeSnapshot> gaze() const override;
   absl::Status SubmitGaze(GazeCommand command) override;
   void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) override;
+  void SetPresence(std::shared_ptr<const ParticipantSet> present) override;
   void SetVideoDemand(VideoView view, bool wanted) override;
   void RequestKeyFrame(VideoView view) override;
 
@@ -89,7 +90,7 @@ class Engine : public Backend {
   void Track(Frame frame);
   void TellGaze(const Frame& frame);
   void Settle();
-  void Publish();
+  void Publish(bool new_frame);
   void Execute(Command command);
   void ResetTracker(const ResetMap& command);
   void MakeStill(StillRequest request);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/anchors/edit_checks.hpp"
+#include "server/pipeline/busy.hpp"
 
 namespace saccade {
 namespace {
@@ -24,6 +25,15 @@ GazeRunner::GazeRunner(std::shared_ptr<Mount> mount, const GazeOptions& options,
     const std::lock_guard lock(mutex_);
     newest_ = state;
   });
+  loop_.SetPresence([this](const std::string& participant_id) {
+    const std::lock_guard lock(mutex_);
+    return present_ != nullptr && present_->contains(participant_id);
+  });
+}
+
+void GazeRunner::SetPresence(std::shared_ptr<const absl::flat_hash_set<std::string>> present) {
+  const std::lock_guard lock(mutex_);
+  present_ = std::move(present);
 }
 
 void GazeRunner::Start() {
@@ -50,7 +60,7 @@ absl::Status GazeRunner::Submit(GazeCommand command) {
     const std::lock_guard lock(mutex_);
     if (stopped_) return absl::UnavailableError("the server is shutting down");
     if (commands_.size() >= mailbox_) {
-      return absl::ResourceExhaustedError("too many gaze commands are waiting: try again shortly");
+      return BusyError("too many gaze commands are waiting", 200'000'000);
     }
     commands_.push_back({MonotonicNow(), std::move(command)});
   }

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <absl/container/flat_hash_set.h>
+
 #include <condition_variable>
 #include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "server/gaze/gaze_loop.hpp"
@@ -33,6 +36,8 @@ class GazeRunner {
   /// The newest view counts; one that was not looked at yet is replaced.
   void OnView(GazeView view);
   std::shared_ptr<const GazeSnapshot> snapshot() const;
+  /// Who has a stream open, by participant_id; never null.
+  void SetPresence(std::shared_ptr<const absl::flat_hash_set<std::string>> present);
 
  private:
   void Run(std::stop_token stop);
@@ -59,6 +64,7 @@ class GazeRunner {
   std::deque<Arrived> commands_;
   std::optional<GazeView> view_;
   std::shared_ptr<const GazeSnapshot> newest_;
+  std::shared_ptr<const absl::flat_hash_set<std::string>> present_;  // null: not told yet
   bool stopped_ = false;
   std::jthread thread_;  // last: it uses everything above
 };

@@ -20,6 +20,7 @@ struct Raw {
                               web_root;
   bool insecure = false;
   double run_for_s = -1.0;
+  double limits_scale = 1.0;
   std::int64_t bit_rate = 0;
   std::int64_t seed = 1;
 };
@@ -79,6 +80,20 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
       if (!keys.empty())
         return Bad(absl::StrCat(raw.config, ": unknown key video.", *keys.begin()));
       left.erase("video");
+    }
+    if (root.contains("limits")) {
+      const toml::value& limits = toml::find(root, "limits");
+      std::set<std::string> keys;
+      for (const auto& [key, value] : limits.as_table()) keys.insert(key);
+      if (keys.erase("scale") > 0) {
+        const toml::value& scale = toml::find(limits, "scale");
+        raw.limits_scale =
+            scale.is_integer() ? static_cast<double>(scale.as_integer()) : scale.as_floating();
+      }
+      if (!keys.empty()) {
+        return Bad(absl::StrCat(raw.config, ": unknown key limits.", *keys.begin()));
+      }
+      left.erase("limits");
     }
     // Read by TrackerOptions, GazeOptions and the mounts.
     for (const char* table : {"tracker", "gaze", "mount_model", "dynamixel", "v4l2"}) {
@@ -164,6 +179,10 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
     return Bad(absl::StrCat("video.bit_rate_bit_s: ", raw.bit_rate, ": 50000 to 100000000, or 0"));
   }
   config.video_bit_rate_bit_s = static_cast<int>(raw.bit_rate);
+  if (!(raw.limits_scale >= 0 && raw.limits_scale <= 1000)) {
+    return Bad(absl::StrCat("limits.scale: ", raw.limits_scale, ": 0 (no limits) to 1000"));
+  }
+  config.limits_scale = raw.limits_scale;
   config.web_root = raw.web_root;
   config.seed = static_cast<std::uint64_t>(raw.seed);
   config.config_file = raw.config;

@@ -37,6 +37,7 @@ struct ServerConfig {
   std::filesystem::path sim_truth;
   // Only in the file: reasons to change them are rare.
   int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size
+  double limits_scale = 1;         // limits.scale: of server/rpc/admission.hpp; 0: none
   std::filesystem::path web_root;  // web_root
   std::uint64_t seed = 1;          // seed
   std::filesystem::path

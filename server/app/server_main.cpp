@@ -13,6 +13,7 @@
 #include "server/app/server_config.hpp"
 #include "server/app/slam_tracker.hpp"
 #include "server/gateway/gateway.hpp"
+#include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
 #include "server/store/annotation_store.hpp"
@@ -104,6 +105,7 @@ void SayProblem(const absl::Status& problem) {
 
 absl::Status Serve(const ServerConfig& config) {
   const sigset_t signals = BlockSignals();
+  RaiseDescriptorLimit();
   StreamHub hub;
   absl::StatusOr<std::unique_ptr<Engine>> engine = MakeEngine(config, hub);
   if (!engine.ok()) return engine.status();
@@ -111,6 +113,7 @@ absl::Status Serve(const ServerConfig& config) {
   RpcServerOptions rpc_options;
   rpc_options.host = config.grpc.host;
   rpc_options.port = config.grpc.port;
+  rpc_options.limits = RpcLimits().Scaled(config.limits_scale);
   absl::StatusOr<std::unique_ptr<RpcServer>> rpc = RpcServer::Start(rpc_options, **engine, hub);
   if (!rpc.ok()) return rpc.status();
   GatewayOptions gateway_options;

@@ -23,6 +23,7 @@ void ViewEncoder::Post(TrackedFrame frame) {
     const std::lock_guard lock(mutex_);
     last_ = frame;
     posted_ns_ = MonotonicNow();
+    redraw_due_ = false;
   }
   if (wanted_) runner_.Post(std::move(frame)).IgnoreError();  // stopped: nobody watches
 }
@@ -32,14 +33,36 @@ void ViewEncoder::SetDemand(bool wanted) {
   wanted_ = wanted;
 }
 
+void ViewEncoder::Redraw(TrackedFrame frame) {
+  {
+    const std::lock_guard lock(mutex_);
+    last_ = std::move(frame);
+  }
+  if (view_ != VideoView::kAugmented) return;  // nothing is drawn into the other
+  redraw_due_ = true;
+  Tick();
+}
+
+void ViewEncoder::Tick() {
+  if (wanted_ && (redraw_due_ || key_requested_)) PostAgain();
+}
+
 void ViewEncoder::RequestKeyFrame() {
   key_requested_ = true;
+  PostAgain();
+}
+
+void ViewEncoder::PostAgain() {
   std::optional<TrackedFrame> again;
   {
     const std::lock_guard lock(mutex_);
-    if (last_ && MonotonicNow() - posted_ns_ > kIdle) again = last_;
+    const Timestamp now_ns = MonotonicNow();
+    if (!last_ || now_ns - posted_ns_ <= kIdle || now_ns - again_ns_ < kKeyFrameInterval) return;
+    again_ns_ = now_ns;
+    redraw_due_ = false;
+    again = last_;
   }
-  if (again) runner_.Post(*std::move(again)).IgnoreError();
+  runner_.Post(*std::move(again)).IgnoreError();
 }
 
 bool ViewEncoder::TakeKeyFrameRequest(Timestamp now_ns) {

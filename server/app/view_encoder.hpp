@@ -35,6 +35,11 @@ class ViewEncoder {
 
   // Any thread; none blocks.
   void Post(TrackedFrame frame);
+  /// The newest frame once more, with what is known of it now. While frames come the next one shows
+  /// it; else it is coded again, at most four times a second: commands never cause video.
+  void Redraw(TrackedFrame frame);
+  /// Once a second: what was put off.
+  void Tick();
   void SetDemand(bool wanted);
   /// The next picture becomes a key frame, at most four times a second; if no frame comes, because
   /// the source ended or stands still, the last one is coded again.
@@ -45,6 +50,8 @@ class ViewEncoder {
 
  private:
   void Step(const TrackedFrame& frame);
+  /// Codes the newest frame once more if no other comes and the last time is long enough ago.
+  void PostAgain();
   bool TakeKeyFrameRequest(Timestamp now_ns);
   absl::Status Prepare(const cv::Mat& picture, const TrackedFrame& frame);
 
@@ -56,10 +63,12 @@ class ViewEncoder {
   RollingStatistics bits_;
   std::atomic<bool> wanted_ = false;
   std::atomic<bool> key_requested_ = false;
+  std::atomic<bool> redraw_due_ = false;
 
   std::mutex mutex_;
   std::optional<TrackedFrame> last_;  // posted, coded or not
   Timestamp posted_ns_ = 0;
+  Timestamp again_ns_ = 0;  // when it was last coded once more
 
   // The runner's thread only.
   std::unique_ptr<VideoEncoder> encoder_;

@@ -71,7 +71,8 @@ GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> sourc
 }
 
 std::optional<Annotation> GazeRun::Find(const std::string& id) const {
-  for (const Annotation& each : *anchors_->Latest()) {
+  const auto annotations = anchors_->Latest();  // held: the next frame replaces the list
+  for (const Annotation& each : *annotations) {
     if (each.id == id) return each;
   }
   return std::nullopt;

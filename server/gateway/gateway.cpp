@@ -5,12 +5,15 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <cstdio>
+#include <exception>
 #include <thread>
 #include <unordered_map>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "server/gateway/http_connection.hpp"
+#include "server/pipeline/descriptors.hpp"
 
 namespace saccade {
 
@@ -73,7 +76,7 @@ class Gateway::Impl {
     }
     port_ = acceptor_.local_endpoint().port();
     Accept();
-    thread_ = std::jthread([this] { io_.run(); });
+    thread_ = std::jthread([this] { Run(); });
     return absl::OkStatus();
   }
 
@@ -110,13 +113,44 @@ class Gateway::Impl {
     });
   }
 
+  // Connections guard their own handlers; whatever is thrown beside them must not end the process.
+  void Run() {
+    for (;;) {
+      try {
+        io_.run();
+        return;
+      } catch (const std::exception& thrown) {
+        std::fprintf(stderr, "gateway: %s\n", thrown.what());
+      }
+    }
+  }
+
   void Serve(tcp::socket socket) {
-    if (connections_.size() >= static_cast<std::size_t>(options_.max_connections)) return;
-    error_code ignored;
-    socket.set_option(tcp::no_delay(true), ignored);
-    const auto connection = HttpConnection::Start(
-        std::move(socket), context_, [this](HttpConnection* gone) { connections_.erase(gone); });
+    if (DescriptorsRunOut(socket.native_handle()) ||
+        connections_.size() >= static_cast<std::size_t>(options_.max_connections)) {
+      if (!CloseLongestIdle()) return;
+    }
+    error_code error;
+    const tcp::endpoint peer = socket.remote_endpoint(error);
+    if (error) return;  // gone already
+    socket.set_option(tcp::no_delay(true), error);
+    NoticeDeadPeer(socket.native_handle());
+    const auto connection =
+        HttpConnection::Start(std::move(socket), peer.address().to_string(), context_,
+                              [this](HttpConnection* gone) { connections_.erase(gone); });
     connections_[connection.get()] = connection;
+  }
+
+  // Who connects and asks nothing must not keep out who asks. False: nobody is idle.
+  bool CloseLongestIdle() {
+    std::shared_ptr<HttpConnection> longest;
+    for (const auto& [raw, weak] : connections_) {
+      const auto connection = weak.lock();
+      if (!connection || !connection->idle_since()) continue;
+      if (!longest || *connection->idle_since() < *longest->idle_since()) longest = connection;
+    }
+    if (longest) longest->Close();
+    return longest != nullptr;
   }
 
   GatewayOptions options_;

@@ -168,6 +168,10 @@ std::optional<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text)
   return std::chrono::nanoseconds(count * unit_ns);
 }
 
+bool IsMetadataValue(absl::string_view text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c >= 0x20 && c < 0x7f; });
+}
+
 bool IsMethodPath(absl::string_view path) {
   if (path.empty() || path.front() != '/') return false;
   const std::vector<absl::string_view> parts = absl::StrSplit(path.substr(1), '/');

@@ -45,6 +45,10 @@ std::string EncodeGrpcWebTrailers(const CallResult& result, GrpcWebFormat format
 /// `grpc-timeout`, e.g. "1500m" (milliseconds): up to 8 digits and one of H M S m u n.
 std::optional<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text);
 
+/// True if gRPC takes `text` as the value of ASCII metadata: printable ASCII. Anything else aborts
+/// the process that adds it.
+bool IsMetadataValue(absl::string_view text);
+
 /// True for `/package.Service/Method` of identifiers only.
 bool IsMethodPath(absl::string_view path);
 

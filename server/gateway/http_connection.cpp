@@ -1,15 +1,20 @@
 #include "server/gateway/http_connection.hpp"
 
 #include <array>
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <chrono>
+#include <cstdio>
+#include <exception>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "server/gateway/http_request_reader.hpp"
 
 namespace saccade {
 namespace {
@@ -19,7 +24,9 @@ namespace http = beast::http;
 namespace net = boost::asio;
 using boost::system::error_code;
 
-constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
+constexpr std::size_t kMaxHeadBytes = 16 * 1024;
+// What may come while we answer: the next requests of a client that pipelines.
+constexpr std::size_t kMaxPipelinedBytes = 64 * 1024;
 // Everything from us, nothing inline, nothing framed: the page needs no more.
 constexpr char kContentSecurityPolicy[] =
     "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; "
@@ -28,10 +35,11 @@ constexpr char kContentSecurityPolicy[] =
 // gRPC's numbers, as far as this side needs them.
 constexpr int kResourceExhausted = 8;
 // Request headers that reach the services as metadata.
+constexpr std::size_t kReadBytes = 16 * 1024;
 constexpr absl::string_view kForwarded[] = {"authorization", "traceparent", "tracestate",
                                             "x-request-id"};
 
-using Request = http::request<http::string_body>;
+using Request = HttpRequestReader::Request;
 
 absl::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -42,14 +50,9 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
       : stream_(std::move(socket)), context_(context), on_closed_(std::move(on_closed)) {}
   ~Connection() override { on_closed_(this); }
 
-  void ReadRequest() {
-    parser_.emplace();
-    parser_->header_limit(kMaxHeaderBytes);
-    parser_->body_limit(context_.max_request_bytes);
-    stream_.expires_after(context_.read_timeout);
-    http::async_read(
-        stream_, buffer_, *parser_,
-        [self = shared_from_this()](error_code error, std::size_t) { self->OnRequest(error); });
+  void Begin(std::string peer) {
+    peer_ = std::move(peer);
+    Guarded([this] { ReadRequest(); });
   }
 
   void Close() override {
@@ -60,11 +63,60 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     if (call_) call_->Cancel();
   }
 
+  std::optional<std::chrono::steady_clock::time_point> idle_since() const override {
+    return idle_since_;
+  }
+
  private:
-  void OnRequest(error_code error) {
-    if (error == http::error::body_limit) return RefuseTooLarge();
-    if (error) return Close();
-    const Request& request = parser_->get();
+  // Whatever is thrown below costs this connection only.
+  template <class Work>
+  void Guarded(Work work) {
+    try {
+      work();
+    } catch (const std::exception& thrown) {
+      std::fprintf(stderr, "gateway: %s: %s\n", peer_.c_str(), thrown.what());
+      Close();
+    }
+  }
+
+  void ReadRequest() {
+    reader_.emplace(kMaxHeadBytes, context_.max_request_bytes);
+    idle_since_ = std::chrono::steady_clock::now();
+    stream_.expires_after(context_.read_timeout);  // for the whole request
+    TakeRequest();
+  }
+
+  void ReadMore() {
+    stream_.async_read_some(buffer_.prepare(kReadBytes),
+                            [self = shared_from_this()](error_code error, std::size_t size) {
+                              if (error) return self->Close();
+                              self->Guarded([&] {
+                                self->buffer_.commit(size);
+                                self->TakeRequest();
+                              });
+                            });
+  }
+
+  void TakeRequest() {
+    switch (reader_->Take(buffer_)) {
+      case HttpRequestReader::Result::kNeedMore:
+        return ReadMore();
+      case HttpRequestReader::Result::kDone:
+        idle_since_.reset();
+        return OnRequest();
+      case HttpRequestReader::Result::kBodyTooLarge:
+        return RefuseTooLarge();
+      case HttpRequestReader::Result::kHeadTooLarge:
+        return RefuseAndClose(
+            http::status::request_header_fields_too_large,
+            absl::StrCat("head, chunk heads and trailers: more than ", kMaxHeadBytes, " bytes"));
+      case HttpRequestReader::Result::kMalformed:
+        return RefuseAndClose(http::status::bad_request, "not HTTP/1.1");
+    }
+  }
+
+  void OnRequest() {
+    const Request& request = reader_->request();
     keep_alive_ = request.keep_alive();
     const absl::string_view host = View(request[http::field::host]);
     if (!context_.hosts.HostAllowed(host)) {
@@ -96,7 +148,7 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
   }
 
   void ServeFile() {
-    const Request& request = parser_->get();
+    const Request& request = reader_->request();
     const StaticFile* file = context_.files.Find(View(request.target()));
     if (file == nullptr) return Refuse(http::status::not_found, "no such page");
     const bool same = View(request[http::field::if_none_match]) == file->etag;
@@ -126,14 +178,21 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     response->set(http::field::content_type, "text/plain; charset=utf-8");
     response->body() = absl::StrCat(reason, "\n");
     response->prepare_payload();
-    if (parser_->get().method() == http::verb::head) response->body().clear();
+    if (reader_->request().method() == http::verb::head) response->body().clear();
     WriteWhole(std::move(response));
   }
 
-  // The body stays unread, so the connection ends with the answer.
-  void RefuseTooLarge() {
+  // The rest stays unread, so the connection ends with the answer.
+  void RefuseAndClose(http::status status, absl::string_view reason) {
+    idle_since_.reset();
     keep_alive_ = false;
-    const auto format = GrpcWebFormatOf(View(parser_->get()[http::field::content_type]));
+    Refuse(status, reason);
+  }
+
+  void RefuseTooLarge() {
+    idle_since_.reset();
+    keep_alive_ = false;
+    const auto format = GrpcWebFormatOf(View(reader_->request()[http::field::content_type]));
     if (!format) return Refuse(http::status::payload_too_large, "request too large");
     Fail(*format, kResourceExhausted,
          absl::StrCat("request: larger than ", context_.max_request_bytes, " bytes"));
@@ -144,7 +203,7 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     stream_.expires_after(context_.write_timeout);
     http::async_write(stream_, *response,
                       [self = shared_from_this(), response](error_code error, std::size_t) {
-                        self->OnAnswered(error);
+                        self->Guarded([&] { self->OnAnswered(error); });
                       });
   }
 
@@ -173,7 +232,7 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
   // --- gRPC-Web ---------------------------------------------------------------------------------
 
   void Forward(GrpcWebFormat format) {
-    const Request& request = parser_->get();
+    const Request& request = reader_->request();
     const absl::string_view method = View(request.target());
     if (!IsMethodPath(method)) return Refuse(http::status::not_found, "no such method");
     absl::StatusOr<std::string> message = DecodeGrpcWebRequest(request.body(), format);
@@ -183,8 +242,14 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     CallRequest call{std::string(method), *std::move(message), {}, {}};
     for (const absl::string_view name : kForwarded) {
       const auto it = request.find(beast::string_view(name.data(), name.size()));
-      if (it != request.end()) call.metadata.emplace_back(name, View(it->value()));
+      if (it == request.end()) continue;
+      if (!IsMetadataValue(View(it->value()))) {
+        return Refuse(http::status::bad_request,
+                      absl::StrCat(name, ": holds a byte that is not printable ASCII"));
+      }
+      call.metadata.emplace_back(name, View(it->value()));
     }
+    call.metadata.emplace_back(kPeerMetadata, peer_);
     call.timeout = ParseGrpcTimeout(View(request["grpc-timeout"]));
     BeginAnswer(format);
     WatchForDisconnect();
@@ -235,10 +300,10 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     out_ = "0\r\n\r\n";
     Write([this] {
       answering_ = false;
-      // Ends the watch for a disconnect; its handler sees `answering_` and does nothing.
+      if (!watching_) return OnAnswered({});
+      // Ends the watch, whose handler goes on: what it has read may be the next request.
       error_code ignored;
       stream_.socket().cancel(ignored);
-      OnAnswered({});
     });
   }
 
@@ -263,52 +328,63 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
         [self = shared_from_this(), then = std::move(then)](error_code error, std::size_t) {
           if (error || self->closed_) return self->Close();
           self->stream_.expires_never();
-          then();
+          self->Guarded(then);
         });
   }
 
-  // While we answer, a browser sends nothing: what can be read is its leaving.
+  // While we answer, a browser sends nothing: what can be read is its leaving. What a client that
+  // pipelines sends is kept for its turn; it must be read, or the end behind it is never seen.
   void WatchForDisconnect() {
     answering_ = true;
-    stream_.socket().async_wait(net::ip::tcp::socket::wait_read,
-                                [self = shared_from_this()](error_code error) {
-                                  if (!error && self->answering_) self->OnReadableWhileAnswering();
-                                });
+    if (!std::exchange(watching_, true)) Watch();
   }
 
-  void OnReadableWhileAnswering() {
-    char byte = 0;
-    error_code error;
-    stream_.socket().non_blocking(true, error);
-    const std::size_t size =
-        stream_.socket().receive(net::buffer(&byte, 1), net::socket_base::message_peek, error);
-    if (error == net::error::would_block) return WatchForDisconnect();
-    if (error || size == 0) Close();
-    // Otherwise a pipelined request waits in the socket's own buffer until its turn.
+  void Watch() {
+    stream_.socket().async_read_some(
+        net::buffer(watched_), [self = shared_from_this()](error_code error, std::size_t size) {
+          self->Guarded([&] { self->OnWatched(error, size); });
+        });
+  }
+
+  void OnWatched(error_code error, std::size_t size) {
+    watching_ = false;
+    if (closed_) return;
+    if (size > 0) {
+      net::buffer_copy(buffer_.prepare(size), net::buffer(watched_, size));
+      buffer_.commit(size);
+    }
+    if (!answering_ && (!error || error == net::error::operation_aborted)) return OnAnswered({});
+    if (error || buffer_.size() > kMaxPipelinedBytes) return Close();
+    watching_ = true;
+    Watch();
   }
 
   beast::tcp_stream stream_;
   const HttpContext& context_;
   std::function<void(HttpConnection*)> on_closed_;
   beast::flat_buffer buffer_;
-  std::optional<http::request_parser<http::string_body>> parser_;
+  std::optional<HttpRequestReader> reader_;
+  std::string peer_;                                                 // address without port
+  std::optional<std::chrono::steady_clock::time_point> idle_since_;  // nothing is asked of us
   bool keep_alive_ = false;
   bool closed_ = false;
   bool answering_ = false;
+  bool watching_ = false;
   GrpcWebFormat format_ = GrpcWebFormat::kBinary;
   std::optional<http::response<http::empty_body>> head_;  // until written
   std::string out_;                                       // what is being written
   std::shared_ptr<UpstreamCall> call_;
   std::array<char, 4096> drain_;
+  std::array<char, 4096> watched_;
 };
 
 }  // namespace
 
 std::shared_ptr<HttpConnection> HttpConnection::Start(
-    net::ip::tcp::socket socket, const HttpContext& context,
+    net::ip::tcp::socket socket, std::string peer, const HttpContext& context,
     std::function<void(HttpConnection*)> on_closed) {
   auto connection = std::make_shared<Connection>(std::move(socket), context, std::move(on_closed));
-  connection->ReadRequest();
+  connection->Begin(std::move(peer));
   return connection;
 }
 

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "server/gateway/host_check.hpp"
 #include "server/gateway/static_files.hpp"
@@ -26,13 +28,16 @@ struct HttpContext {
 /// One browser connection: requests one after the other, on the gateway's thread.
 class HttpConnection {
  public:
-  /// Starts to serve `socket`. Lives until the connection ends; `on_closed` is told then.
+  /// Starts to serve `socket` for `peer` (its address without the port, which calls carry as
+  /// `kPeerMetadata`). Lives until the connection ends; `on_closed` is told then.
   static std::shared_ptr<HttpConnection> Start(boost::asio::ip::tcp::socket socket,
-                                               const HttpContext& context,
+                                               std::string peer, const HttpContext& context,
                                                std::function<void(HttpConnection*)> on_closed);
   virtual ~HttpConnection() = default;
   /// Ends it at once, with whatever call is under way.
   virtual void Close() = 0;
+  /// Since when it waits for a whole request; nothing while one is being answered.
+  virtual std::optional<std::chrono::steady_clock::time_point> idle_since() const = 0;
 };
 
 }  // namespace saccade

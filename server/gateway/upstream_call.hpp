@@ -14,6 +14,10 @@ class Channel;
 
 namespace saccade {
 
+/// Tells the services behind an in-process channel whose call it is: the browser's address without
+/// its port. Only there is it to be believed.
+inline constexpr char kPeerMetadata[] = "x-saccade-peer";
+
 /// One RPC to forward: any method, its one request message still encoded.
 struct CallRequest {
   std::string method;  // "/saccade.v1.SessionService/Join"

@@ -6,8 +6,13 @@
 #include <cmath>
 #include <utility>
 
+#include "server/pipeline/busy.hpp"
+
 namespace saccade {
 namespace {
+
+// The whole queue is told to everybody with each change.
+constexpr std::size_t kMaxQueue = 16;
 
 Timestamp Ns(double seconds) { return static_cast<Timestamp>(std::llround(1e9 * seconds)); }
 
@@ -63,7 +68,9 @@ void GazeArbiter::Hand(Handover::Why why, std::optional<GazeCaller> to, Timestam
     std::erase_if(queue_, [&](const Waiting& waiting) {
       return waiting.caller.pilot.participant_id == to->pilot.participant_id;
     });
-    lease_ = Lease{new_id_(), *std::move(to), now_ns + Ns(grace_s)};
+    // The wearer is given as long as ever to be heard of.
+    const double silence_s = to->wearer ? std::max(grace_s, SilenceOf(*to)) : grace_s;
+    lease_ = Lease{new_id_(), *std::move(to), now_ns + Ns(silence_s)};
   } else {
     lease_.reset();
   }
@@ -71,6 +78,14 @@ void GazeArbiter::Hand(Handover::Why why, std::optional<GazeCaller> to, Timestam
   last_words_ = change.words;
   ++count_;
   handovers_.push_back(std::move(change));
+}
+
+double GazeArbiter::SilenceOf(const GazeCaller& caller) const {
+  return caller.wearer ? options_.wearer_silence_s : options_.heartbeat_s;
+}
+
+void GazeArbiter::Renew(Timestamp now_ns) {
+  lease_->expires_ns = std::max(lease_->expires_ns, now_ns + Ns(SilenceOf(lease_->caller)));
 }
 
 void GazeArbiter::HandToNext(Handover::Why why, Timestamp now_ns) {
@@ -92,7 +107,7 @@ absl::StatusOr<LeaseAnswer> GazeArbiter::Acquire(const GazeCaller& caller,
   LeaseAnswer answer;
   answer.pilot = lease_->caller.pilot;
   if (Holds(caller)) {
-    lease_->expires_ns = now_ns + Ns(options_.heartbeat_s);
+    lease_->expires_ns = now_ns + Ns(SilenceOf(caller));
     answer.granted = true;
     answer.lease_id = lease_->id;
     return answer;
@@ -100,7 +115,13 @@ absl::StatusOr<LeaseAnswer> GazeArbiter::Acquire(const GazeCaller& caller,
   auto place = std::find_if(queue_.begin(), queue_.end(), [&](const Waiting& waiting) {
     return waiting.caller.pilot.participant_id == caller.pilot.participant_id;
   });
-  if (place == queue_.end()) place = queue_.insert(queue_.end(), {caller, now_ns});
+  if (place == queue_.end()) {
+    if (queue_.size() >= kMaxQueue) {
+      return BusyError(absl::StrCat("lease: ", queue_.size(), " wait already, as many as may"),
+                       Ns(options_.queue_silence_s));
+    }
+    place = queue_.insert(queue_.end(), {caller, now_ns});
+  }
   place->seen_ns = now_ns;
   answer.queue_position = static_cast<std::size_t>(place - queue_.begin()) + 1;
   return answer;
@@ -129,7 +150,7 @@ absl::Status GazeArbiter::MaySteer(const GazeCaller& caller, Timestamp now_ns) {
         absl::StrCat("gaze: ", NameOf(lease_->caller.pilot),
                      " pilots; acquire the lease to wait for your turn"));
   }
-  lease_->expires_ns = std::max(lease_->expires_ns, now_ns + Ns(options_.heartbeat_s));
+  Renew(now_ns);
   return absl::OkStatus();
 }
 
@@ -137,10 +158,15 @@ absl::Status GazeArbiter::Override(const GazeCaller& caller, bool enabled, Times
   if (!caller.wearer) {
     return absl::PermissionDeniedError("session_id: only the wearer takes over");
   }
+  Tick(now_ns);
   if (!enabled) return Release(caller, now_ns);
-  if (Holds(caller)) return absl::OkStatus();
-  // Who loses the head is the first to have it back.
-  if (lease_) queue_.insert(queue_.begin(), {lease_->caller, now_ns});
+  if (Holds(caller)) {
+    Renew(now_ns);
+    return absl::OkStatus();
+  }
+  // Who loses the head is the first to have it back; but there is one wearer, and an earlier one
+  // who still held it is not somebody to give it back to.
+  if (lease_ && !lease_->caller.wearer) queue_.insert(queue_.begin(), {lease_->caller, now_ns});
   Hand(Handover::Why::kOverridden, caller, now_ns, options_.heartbeat_s);
   return absl::OkStatus();
 }
@@ -155,9 +181,11 @@ void GazeArbiter::Tick(Timestamp now_ns) {
   std::erase_if(queue_, [&](const Waiting& waiting) {
     return Seconds(now_ns - waiting.seen_ns) > options_.queue_silence_s;
   });
-  while (lease_ && !lease_->caller.wearer && now_ns > lease_->expires_ns) {
-    HandToNext(Handover::Why::kVanished, now_ns);
+  if (lease_ && lease_->caller.wearer && present_ &&
+      present_(lease_->caller.pilot.participant_id)) {
+    Renew(now_ns);
   }
+  while (lease_ && now_ns > lease_->expires_ns) HandToNext(Handover::Why::kVanished, now_ns);
 }
 
 }  // namespace saccade

@@ -22,8 +22,9 @@ struct Handover {
 };
 
 /// One pilot at a time, by lease; the others queue. The pilot's heartbeat is any call of his; after
-/// `heartbeat_s` of silence he is gone. The wearer needs no heartbeat: what he took he keeps until
-/// he gives it back. Pure logic with explicit time; one thread.
+/// `heartbeat_s` of silence he is gone. The wearer needs no heartbeat while his stream is open:
+/// what he took he keeps until he gives it back, or is gone himself. Pure logic with explicit time;
+/// one thread.
 class GazeArbiter {
  public:
   /// `new_id` makes lease ids (UUIDs).
@@ -32,6 +33,7 @@ class GazeArbiter {
 
   /// Grants, renews or queues.
   ///   FailedPrecondition  `lease_id` given, but it is not (or no longer) the one in force
+  ///   ResourceExhausted   as many as may wait already
   absl::StatusOr<LeaseAnswer> Acquire(const GazeCaller& caller, const std::string& lease_id,
                                       Timestamp now_ns);
   /// FailedPrecondition: neither pilot nor in the queue.
@@ -43,6 +45,10 @@ class GazeArbiter {
   /// PermissionDenied: only the wearer.
   absl::Status Override(const GazeCaller& caller, bool enabled, Timestamp now_ns);
   absl::Status Pause(const GazeCaller& caller, bool paused);
+
+  /// Whether a participant has a stream; without this nobody has.
+  using Present = std::function<bool(const std::string& participant_id)>;
+  void SetPresence(Present present) { present_ = std::move(present); }
 
   /// Notices who is gone. To be called at least every 50 ms.
   void Tick(Timestamp now_ns);
@@ -70,9 +76,12 @@ class GazeArbiter {
   /// To the first in the queue, or to nobody.
   void HandToNext(Handover::Why why, Timestamp now_ns);
   bool Holds(const GazeCaller& caller) const;
+  void Renew(Timestamp now_ns);
+  double SilenceOf(const GazeCaller& caller) const;
 
   const GazeOptions options_;
   const std::function<std::string()> new_id_;
+  Present present_;
   std::optional<Lease> lease_;
   std::vector<Waiting> queue_;
   bool paused_ = false;

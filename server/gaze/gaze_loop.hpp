@@ -34,6 +34,8 @@ class GazeLoop {
   void Execute(const GazeCommand& command, Timestamp now_ns);
   void OnView(const GazeView& view);
   void Step(Timestamp now_ns);
+  /// Whether a participant has a stream: the wearer who has none is gone after a while.
+  void SetPresence(GazeArbiter::Present present) { arbiter_.SetPresence(std::move(present)); }
 
   /// Without a lease, for programs that are their own pilot (evaluation).
   absl::Status Fixate(const GazeTarget& target, bool fast);

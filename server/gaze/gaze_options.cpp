@@ -35,6 +35,7 @@ const Key kKeys[] = {
     {"max_target_distance_m", &O::max_target_distance_m, 0.1, 1e6},
     {"heartbeat_s", &O::heartbeat_s, 0.1, 60},
     {"queue_silence_s", &O::queue_silence_s, 0.5, 3600},
+    {"wearer_silence_s", &O::wearer_silence_s, 1, 3600},
     {"turn_grace_s", &O::turn_grace_s, 0.1, 60},
     {"explore_when_idle", &O::explore_when_idle, 0, 1},
     {"explore_dwell_s", &O::explore_dwell_s, 0.1, 60},

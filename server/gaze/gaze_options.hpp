@@ -35,7 +35,9 @@ struct GazeOptions {
   // Lease.
   double heartbeat_s = 0.5;    // silence after which a pilot is gone
   double queue_silence_s = 5;  // ... and one who waits
-  double turn_grace_s = 3.0;   // for the next in the queue to notice that it is his turn
+  /// ... and a wearer whose stream is closed: a page that is loaded again needs less.
+  double wearer_silence_s = 10;
+  double turn_grace_s = 3.0;  // for the next in the queue to notice that it is his turn
 
   // Idle time.
   bool explore_when_idle = false;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "server/overlay/label_painter.hpp"
 #include "server/overlay/painter.hpp"
 #include "server/overlay/strokes.hpp"
 
@@ -53,7 +54,7 @@ void DrawFeatures(const CameraModel& camera, const MapSnapshot& snapshot,
 
 void DrawAnnotations(const CameraModel& camera, const MapSnapshot& snapshot,
                      const std::vector<Annotation>& annotations, const OverlayOptions& options,
-                     Painter& painter) {
+                     cv::Mat& picture, Painter& painter) {
   const Marks marks = AnnotationMarks(camera, snapshot.world_from_camera, annotations);
   const auto color = [&options](const std::string& id, std::uint32_t rgba) {
     return options.fixated_annotation == id ? kFixatedColor : ColorOf(rgba);
@@ -63,10 +64,11 @@ void DrawAnnotations(const CameraModel& camera, const MapSnapshot& snapshot,
     painter.Lines({stroke.points_px}, color(stroke.annotation_id, stroke.color_rgba), kLinePx,
                   stroke.hollow);
   }
+  std::vector<ColoredLabel> labels;
   for (const Label& label : marks.labels) {
-    painter.Box(label.at_px, label.text, color(label.annotation_id, label.color_rgba),
-                label.hollow);
+    labels.push_back({&label, color(label.annotation_id, label.color_rgba)});
   }
+  DrawLabels(std::move(labels), picture, painter);
   if (!options.edge_arrows) return;
   for (const EdgeArrow& arrow : marks.edge_arrows) {
     painter.EdgeArrow(arrow.tip_px, arrow.direction, color(arrow.annotation_id, arrow.color_rgba),
@@ -128,7 +130,8 @@ cv::Mat Augment(const Frame& frame, const MapSnapshot& snapshot,
   if (HasPose(snapshot)) {
     if (options.world_axes) DrawAxes(camera, snapshot, painter);
     if (options.features) DrawFeatures(camera, snapshot, options, painter);
-    if (options.annotations) DrawAnnotations(camera, snapshot, annotations, options, painter);
+    if (options.annotations)
+      DrawAnnotations(camera, snapshot, annotations, options, picture, painter);
   }
   if (options.status_line) {
     painter.Status(StatusLine(snapshot), snapshot.status != TrackingStatus::kTracking);

@@ -24,7 +24,8 @@ struct OverlayOptions {
 
 /// The picture of `frame` with everything that `snapshot` (of the same frame) and `annotations`
 /// (resolved with that snapshot) say, through the lens of that frame. CV_8UC3 BGR, size of the
-/// frame. Never fails: what cannot be projected is left out. Any thread, no state.
+/// frame. Never fails: what cannot be projected is left out. Any thread; each keeps the texts that
+/// it drew (TextPainter).
 cv::Mat Augment(const Frame& frame, const MapSnapshot& snapshot,
                 const std::vector<Annotation>& annotations, const OverlayOptions& options);
 

@@ -4,32 +4,20 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "server/overlay/text_painter.hpp"
+
 namespace saccade {
 namespace {
 
 constexpr int kShift = 4;  // OpenCV takes coordinates in sixteenths of a pixel
 constexpr double kDashPx = 5.0;
 const cv::Scalar kHalo{24, 22, 20};
-const cv::Scalar kBoxFill{18, 17, 16};
-constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
+constexpr int kSmallestLetters_px = 11;
+constexpr int kStatusLines = 2;
 
 cv::Point Fixed(const Eigen::Vector2d& pixel) {
   return {static_cast<int>(std::lround(pixel.x() * (1 << kShift))),
           static_cast<int>(std::lround(pixel.y() * (1 << kShift)))};
-}
-
-/// OpenCV's built-in letters are ASCII: others become one question mark each.
-std::string Ascii(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x20 && byte < 0x7f) {
-      out += c;
-    } else if (byte >= 0xc0) {
-      out += '?';
-    }
-  }
-  return out;
 }
 
 /// Cuts a polyline into dashes of equal length.
@@ -117,34 +105,16 @@ void Painter::Feature(const Eigen::Vector2d& at, FeatureState state, bool fixate
   }
 }
 
-void Painter::Box(const Eigen::Vector2d& at, const std::string& text, const cv::Scalar& color,
-                  bool dashed) {
-  const std::string words = Ascii(text);
-  const double font = 0.45 * scale_;
-  int baseline = 0;
-  const cv::Size size = cv::getTextSize(words, kFont, font, 1, &baseline);
-  const double width = size.width + 12 * scale_;
-  const double height = 21 * scale_;
-  const Eigen::Vector2d corner = at + Eigen::Vector2d(6 * scale_, -4 * scale_ - height);
-  const cv::Rect box(static_cast<int>(corner.x()), static_cast<int>(corner.y()),
-                     static_cast<int>(width), static_cast<int>(height));
-  const cv::Rect inside = box & cv::Rect(0, 0, picture_.cols, picture_.rows);
-  if (inside.area() > 0) picture_(inside).setTo(kBoxFill);
-  const Eigen::Vector2d right(width, 0), down(0, height);
-  Lines({{corner, corner + right, corner + right + down, corner + down, corner}}, color, 1.5,
-        dashed);
-  const cv::Point origin(static_cast<int>(corner.x() + 6 * scale_),
-                         static_cast<int>(corner.y() + 0.5 * (height + size.height)));
-  cv::putText(picture_, words, origin, kFont, font, color,
-              std::max(1, static_cast<int>(std::lround(scale_))), cv::LINE_AA);
-}
-
 void Painter::Text(const Eigen::Vector2d& at, const std::string& text, const cv::Scalar& color) {
-  const cv::Point origin(static_cast<int>(at.x()), static_cast<int>(at.y()));
-  const double font = 0.45 * scale_;
-  const int width = std::max(1, static_cast<int>(std::lround(scale_)));
-  cv::putText(picture_, Ascii(text), origin, kFont, font, kHalo, 3 * width, cv::LINE_AA);
-  cv::putText(picture_, Ascii(text), origin, kFont, font, color, width, cv::LINE_AA);
+  TextStyle style;
+  style.layout = {std::max(kSmallestLetters_px, cvRound(14 * scale_)), 1e9, 1};
+  style.color = color;
+  style.ground = TextGround::kHalo;
+  style.margin_px = cvRound(3 * scale_);
+  const auto sprite = TextPainter::OfThisThread().Sprite("", text, style);
+  const cv::Point corner(static_cast<int>(at.x()) - style.margin_px,
+                         static_cast<int>(at.y()) - sprite->baseline_px);
+  TextPainter::Lay(*sprite, corner, picture_);
 }
 
 void Painter::EdgeArrow(const Eigen::Vector2d& tip, const Eigen::Vector2d& direction,
@@ -161,23 +131,20 @@ void Painter::EdgeArrow(const Eigen::Vector2d& tip, const Eigen::Vector2d& direc
 }
 
 void Painter::Status(const std::string& text, bool warn) {
-  const std::string words = Ascii(text);
-  const int height = static_cast<int>(28 * scale_);
+  TextStyle style;
+  style.layout = {std::max(kSmallestLetters_px, cvRound(16 * scale_)),
+                  std::floor(picture_.cols - 20 * scale_), kStatusLines};
+  style.color = warn ? cv::Scalar(120, 190, 255) : cv::Scalar(255, 255, 255);
+  const auto sprite = TextPainter::OfThisThread().Sprite("", text, style);
+  const int height = sprite->pixels.rows + cvRound(8 * scale_);
   const cv::Rect band = cv::Rect(0, picture_.rows - height, picture_.cols, height) &
                         cv::Rect(0, 0, picture_.cols, picture_.rows);
   if (band.area() == 0) return;
   cv::Mat under = picture_(band);
   under.convertTo(under, -1, 0.35);
-  double font = 0.55 * scale_;
-  int baseline = 0;
-  const int thick = std::max(1, static_cast<int>(std::lround(1.5 * scale_)));
-  const int wide = cv::getTextSize(words, kFont, font, thick, &baseline).width;
-  const double room = picture_.cols - 20 * scale_;
-  if (wide > room) font *= room / wide;
-  const cv::Point origin(static_cast<int>(10 * scale_),
-                         picture_.rows - static_cast<int>(9 * scale_));
-  const cv::Scalar color = warn ? cv::Scalar(120, 190, 255) : cv::Scalar(255, 255, 255);
-  cv::putText(picture_, words, origin, kFont, font, color, thick, cv::LINE_AA);
+  const cv::Point corner(cvRound(10 * scale_),
+                         picture_.rows - sprite->pixels.rows - cvRound(5 * scale_));
+  TextPainter::Lay(*sprite, corner, picture_);
 }
 
 }  // namespace saccade

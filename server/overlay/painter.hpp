@@ -26,14 +26,15 @@ class Painter {
   void HaloUnder(const std::vector<Polyline2>& lines, double width_px);
   /// Shape by state, so that colour is not alone: disc measured, cross failed, ring not attempted.
   void Feature(const Eigen::Vector2d& at, FeatureState state, bool fixated);
-  /// A filled box, its lower left corner 6 px right of and 4 px above `at`.
-  void Box(const Eigen::Vector2d& at, const std::string& text, const cv::Scalar& color,
-           bool dashed);
+  /// One line over a dark rim; its baseline begins at `at`.
   void Text(const Eigen::Vector2d& at, const std::string& text, const cv::Scalar& color);
   void EdgeArrow(const Eigen::Vector2d& tip, const Eigen::Vector2d& direction,
                  const cv::Scalar& color, bool hollow);
-  /// A line of text over a dark band at the bottom.
+  /// Text over a dark band at the bottom, at most two lines of it.
   void Status(const std::string& text, bool warn);
+
+  /// Of the picture to one 640 px wide; at least a half.
+  double scale() const { return scale_; }
 
  private:
   void Polyline(const Polyline2& line, const cv::Scalar& color, double width_px);

@@ -13,7 +13,6 @@ constexpr double kAxisM = 0.1;
 constexpr double kBorderPx = 32.0;     // labels are kept this far outside the picture
 constexpr double kEdgeInsetPx = 26.0;  // of the tips of edge arrows
 constexpr std::size_t kMaxEdgeArrows = 8;
-constexpr std::size_t kMaxLabel = 40;  // characters
 
 std::vector<Polyline3> CubeLines(const Eigen::Vector3d& centre, double size_m) {
   const double h = 0.5 * size_m;
@@ -45,23 +44,12 @@ Eigen::Vector3d NoteTop(const Annotation& annotation) {
   return annotation.anchor.point_in_world - Eigen::Vector3d(0, annotation.size_m, 0);
 }
 
-/// At most 40 characters (UTF-8), an ellipsis for the rest; one line.
-std::string Shorten(const std::string& text) {
-  std::string out;
-  std::size_t characters = 0, cut_at = 0;
-  for (const char c : text) {
-    if ((c & 0xc0) != 0x80 && ++characters == kMaxLabel) cut_at = out.size();
-    if (characters > kMaxLabel) return out.substr(0, cut_at) + "…";
-    out += c == '\n' || c == '\r' || c == '\t' ? ' ' : c;
-  }
-  return out;
+std::string Words(const Annotation& annotation) {
+  const bool nameless = annotation.shape == AnnotationShape::kNote && annotation.text.empty();
+  return nameless ? "note" : annotation.text;
 }
 
-std::string LabelText(const Annotation& annotation, bool hollow) {
-  std::string words;
-  if (annotation.shape == AnnotationShape::kNote || !annotation.text.empty()) {
-    words = Shorten(annotation.text.empty() ? "note" : annotation.text);
-  }
+std::string WithWarning(const std::string& words, bool hollow) {
   if (!hollow) return words;
   return words.empty() ? "do not trust" : words + ": do not trust";
 }
@@ -137,9 +125,10 @@ Marks AnnotationMarks(const CameraModel& camera, const Rigid3& world_from_camera
                                          : in_camera;
     const std::optional<Eigen::Vector2d> at = camera.Project(label_at);
     if (!at || !camera.InImage(*at, -kBorderPx)) continue;
-    const std::string text = LabelText(annotation, hollow);
+    const std::string words = Words(annotation);
+    const std::string text = WithWarning(words, hollow);
     if (!text.empty()) {
-      marks.labels.push_back({annotation.id, text, annotation.color_rgba, hollow, *at});
+      marks.labels.push_back({annotation.id, words, text, annotation.color_rgba, hollow, *at});
     }
   }
   return marks;

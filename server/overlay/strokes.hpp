@@ -27,7 +27,8 @@ struct Stroke {
 /// A text beside a point.
 struct Label {
   std::string annotation_id;
-  std::string text;  // at most 40 characters, and the words "do not trust" where it is hollow
+  std::string words;  // all of the annotation's text; "note" for a note without
+  std::string text;   // the same, and the words "do not trust" where it is hollow
   std::uint32_t color_rgba = 0xffffffff;
   bool hollow = false;
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();

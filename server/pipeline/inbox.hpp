@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/pipeline/busy.hpp"
+
 namespace saccade {
 
 /// What one thread waits for: the newest item (a frame) and a bounded mailbox of commands.
@@ -64,7 +66,7 @@ class Inbox {
       const std::lock_guard lock(mutex_);
       if (closed_) return absl::UnavailableError("the server is shutting down");
       if (commands_.size() >= capacity_) {
-        return absl::ResourceExhaustedError("too many commands are waiting: try again shortly");
+        return BusyError("too many commands are waiting", 200'000'000);
       }
       commands_.push_back(std::move(command));
     }

@@ -10,6 +10,8 @@
 #include <thread>
 #include <utility>
 
+#include "server/pipeline/busy.hpp"
+
 namespace saccade {
 
 /// What a stage's queue does when it is full.
@@ -48,7 +50,7 @@ class Runner {
       if (stopped_) return absl::UnavailableError("the stage has stopped");
       if (queue_.size() >= options_.capacity) {
         if (options_.when_full == WhenFull::kRefuse) {
-          return absl::ResourceExhaustedError("the stage is busy: try again shortly");
+          return BusyError("the stage is busy", 200'000'000);
         }
         queue_.pop_front();
         ++dropped_;

@@ -66,7 +66,8 @@ grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext*
                                                     const v1::CreateAnnotationRequest* request,
                                                     v1::CreateAnnotationResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  const absl::StatusOr<Session> session =
+      gate_.Editor(*context, Toll::kEdit, request->session_id());
   if (!session.ok()) return Refuse(reactor, "Create", "", session.status());
   if (!request->request_id().empty()) {
     absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
@@ -86,7 +87,8 @@ grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext*
                                                     const v1::UpdateAnnotationRequest* request,
                                                     v1::UpdateAnnotationResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  const absl::StatusOr<Session> session =
+      gate_.Editor(*context, Toll::kEdit, request->session_id());
   if (!session.ok()) return Refuse(reactor, "Update", "", session.status());
   absl::StatusOr<AnnotationPatch> patch = PatchFromProto(*request, ImageOf(backend_));
   if (!patch.ok()) return Refuse(reactor, "Update", session->participant_id, patch.status());
@@ -100,7 +102,8 @@ grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext*
                                                     const v1::DeleteAnnotationRequest* request,
                                                     v1::DeleteAnnotationResponse* /*response*/) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  const absl::StatusOr<Session> session =
+      gate_.Editor(*context, Toll::kEdit, request->session_id());
   if (!session.ok()) return Refuse(reactor, "Delete", "", session.status());
   if (absl::Status uuid = wire::CheckUuid(request->id(), "id"); !uuid.ok()) {
     return Refuse(reactor, "Delete", session->participant_id, uuid);
@@ -118,6 +121,9 @@ grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* c
                                                   const v1::ListAnnotationsRequest* request,
                                                   v1::ListAnnotationsResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (absl::Status often = gate_.Anyone(*context, Toll::kRead); !often.ok()) {
+    return Refuse(reactor, "List", "", often);
+  }
   // Not those of the newest frame: an edit that was answered is here at once. Held: the list is
   // replaced by every frame and edit meanwhile.
   const std::shared_ptr<const AnnotationList> annotations = backend_.annotations();
@@ -126,14 +132,13 @@ grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* c
 }
 
 template <typename Response>
-void AnnotationService::TakeBack(grpc::ServerUnaryReactor* reactor, const std::string& session_id,
-                                 bool redo, Response* response) {
+grpc::ServerUnaryReactor* AnnotationService::TakeBack(grpc::CallbackServerContext* context,
+                                                      const std::string& session_id, bool redo,
+                                                      Response* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const char* method = redo ? "Redo" : "Undo";
-  const absl::StatusOr<Session> session = sessions_.FindEditor(session_id);
-  if (!session.ok()) {
-    Refuse(reactor, method, "", session.status());
-    return;
-  }
+  const absl::StatusOr<Session> session = gate_.Editor(*context, Toll::kEdit, session_id);
+  if (!session.ok()) return Refuse(reactor, method, "", session.status());
   Submit(reactor, method, session->participant_id,
          UndoChange{session->participant_id, redo,
                     [reactor, response, method,
@@ -142,22 +147,19 @@ void AnnotationService::TakeBack(grpc::ServerUnaryReactor* reactor, const std::s
                       Audit(method, id, description.status());
                       reactor->Finish(ToGrpc(description.status()));
                     }});
+  return reactor;
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Undo(grpc::CallbackServerContext* context,
                                                   const v1::UndoAnnotationRequest* request,
                                                   v1::UndoAnnotationResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  TakeBack(reactor, request->session_id(), false, response);
-  return reactor;
+  return TakeBack(context, request->session_id(), false, response);
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Redo(grpc::CallbackServerContext* context,
                                                   const v1::RedoAnnotationRequest* request,
                                                   v1::RedoAnnotationResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  TakeBack(reactor, request->session_id(), true, response);
-  return reactor;
+  return TakeBack(context, request->session_id(), true, response);
 }
 
 }  // namespace saccade

@@ -2,7 +2,7 @@
 
 #include "saccade/v1/annotation.grpc.pb.h"
 #include "server/rpc/backend.hpp"
-#include "server/rpc/session_table.hpp"
+#include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/stream_hub.hpp"
 
 namespace saccade {
@@ -11,8 +11,7 @@ namespace saccade {
 /// the store's commit. Handlers run on gRPC's threads and never block.
 class AnnotationService final : public v1::AnnotationService::CallbackService {
  public:
-  AnnotationService(Backend& backend, StreamHub& hub, SessionTable& sessions)
-      : backend_(backend), hub_(hub), sessions_(sessions) {}
+  AnnotationService(Backend& backend, Gatekeeper& gate) : backend_(backend), gate_(gate) {}
 
  private:
   grpc::ServerUnaryReactor* Create(grpc::CallbackServerContext* context,
@@ -38,14 +37,13 @@ class AnnotationService final : public v1::AnnotationService::CallbackService {
   Done<Annotation> Answer(grpc::ServerUnaryReactor* reactor, Response* response, const char* method,
                           const std::string& session_id);
   template <typename Response>
-  void TakeBack(grpc::ServerUnaryReactor* reactor, const std::string& session_id, bool redo,
-                Response* response);
+  grpc::ServerUnaryReactor* TakeBack(grpc::CallbackServerContext* context,
+                                     const std::string& session_id, bool redo, Response* response);
   void Submit(grpc::ServerUnaryReactor* reactor, const char* method, const std::string& session_id,
               Command command);
 
   Backend& backend_;
-  StreamHub& hub_;
-  SessionTable& sessions_;
+  Gatekeeper& gate_;
 };
 
 }  // namespace saccade

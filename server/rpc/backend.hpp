@@ -1,5 +1,6 @@
 #pragma once
 
+#include <absl/container/flat_hash_set.h>
 #include <absl/status/statusor.h>
 
 #include <cstdint>
@@ -27,6 +28,8 @@ struct Still {
   TrackedEvent tracked;
 };
 
+using ParticipantSet = absl::flat_hash_set<std::string>;
+
 /// What the services need of the rest of the server. Thread safe; nothing blocks.
 class Backend : public CommandPort {
  public:
@@ -44,6 +47,8 @@ class Backend : public CommandPort {
   ///   NotFound           no longer, or not yet, in the ring
   ///   ResourceExhausted  too many stills are being made
   virtual void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) = 0;
+  /// Who has a stream open, by participant_id; never null.
+  virtual void SetPresence(std::shared_ptr<const ParticipantSet> present) = 0;
   /// Whether anybody watches; nothing is coded for nobody.
   virtual void SetVideoDemand(VideoView view, bool wanted) = 0;
   /// The next picture of `view` will be a key frame. Requests are coalesced.

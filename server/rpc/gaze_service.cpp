@@ -37,8 +37,9 @@ DoneEmpty Answer(grpc::ServerUnaryReactor* reactor, const char* method,
 
 }  // namespace
 
-absl::StatusOr<GazeCaller> GazeService::CallerOf(const std::string& session_id) {
-  const absl::StatusOr<Session> session = sessions_.FindEditor(session_id);
+absl::StatusOr<GazeCaller> GazeService::CallerOf(const Context& context,
+                                                 const std::string& session_id) {
+  const absl::StatusOr<Session> session = gate_.Editor(context, Toll::kGaze, session_id);
   if (!session.ok()) return session.status();
   return GazeCaller{{session->participant_id, session->display_name},
                     session->role == v1::ROLE_WEARER};
@@ -53,9 +54,10 @@ void GazeService::Submit(Reactor* reactor, const char* method, const std::string
 grpc::ServerUnaryReactor* GazeService::GetState(Context* context,
                                                 const v1::GetGazeStateRequest* /*request*/,
                                                 v1::GetGazeStateResponse* response) {
-  *response->mutable_state() = wire::ToProto(*backend_.gaze());
   Reactor* reactor = context->DefaultReactor();
-  reactor->Finish(grpc::Status::OK);
+  const absl::Status often = gate_.Anyone(*context, Toll::kRead);
+  if (often.ok()) *response->mutable_state() = wire::ToProto(*backend_.gaze());
+  reactor->Finish(ToGrpc(often));
   return reactor;
 }
 
@@ -63,7 +65,7 @@ grpc::ServerUnaryReactor* GazeService::AcquireLease(Context* context,
                                                     const v1::AcquireLeaseRequest* request,
                                                     v1::AcquireLeaseResponse* response) {
   Reactor* reactor = context->DefaultReactor();
-  absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
+  absl::StatusOr<GazeCaller> caller = CallerOf(*context, request->session_id());
   if (!caller.ok()) return Refuse(reactor, "AcquireLease", "", caller.status());
   const std::string session_id = caller->pilot.participant_id;
   const bool renews = !request->lease_id().empty();
@@ -92,7 +94,7 @@ grpc::ServerUnaryReactor* GazeService::ReleaseLease(Context* context,
                                                     const v1::ReleaseLeaseRequest* request,
                                                     v1::ReleaseLeaseResponse* /*response*/) {
   Reactor* reactor = context->DefaultReactor();
-  absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
+  absl::StatusOr<GazeCaller> caller = CallerOf(*context, request->session_id());
   if (!caller.ok()) return Refuse(reactor, "ReleaseLease", "", caller.status());
   const std::string id = caller->pilot.participant_id;
   Submit(reactor, "ReleaseLease", id,
@@ -103,7 +105,7 @@ grpc::ServerUnaryReactor* GazeService::ReleaseLease(Context* context,
 grpc::ServerUnaryReactor* GazeService::Fixate(Context* context, const v1::FixateRequest* request,
                                               v1::FixateResponse* response) {
   Reactor* reactor = context->DefaultReactor();
-  absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
+  absl::StatusOr<GazeCaller> caller = CallerOf(*context, request->session_id());
   if (!caller.ok()) return Refuse(reactor, "Fixate", "", caller.status());
   const std::string id = caller->pilot.participant_id;
   absl::StatusOr<GazeTarget> target = wire::FromProto(request->target(), "target");
@@ -119,7 +121,7 @@ grpc::ServerUnaryReactor* GazeService::Steer(Context* context, const Request* re
                                              Response* response, const char* method,
                                              SteerGaze::What what) {
   Reactor* reactor = context->DefaultReactor();
-  absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
+  absl::StatusOr<GazeCaller> caller = CallerOf(*context, request->session_id());
   if (!caller.ok()) return Refuse(reactor, method, "", caller.status());
   const std::string id = caller->pilot.participant_id;
   Submit(reactor, method, id,
@@ -174,7 +176,7 @@ grpc::ServerUnaryReactor* GazeService::Override(Context* context,
                                                 const v1::OverrideRequest* request,
                                                 v1::OverrideResponse* /*response*/) {
   Reactor* reactor = context->DefaultReactor();
-  absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
+  absl::StatusOr<GazeCaller> caller = CallerOf(*context, request->session_id());
   if (!caller.ok()) return Refuse(reactor, "Override", "", caller.status());
   const std::string id = caller->pilot.participant_id;
   Submit(reactor, "Override", id,
@@ -185,7 +187,7 @@ grpc::ServerUnaryReactor* GazeService::Override(Context* context,
 grpc::ServerUnaryReactor* GazeService::Pause(Context* context, const v1::PauseRequest* request,
                                              v1::PauseResponse* /*response*/) {
   Reactor* reactor = context->DefaultReactor();
-  absl::StatusOr<GazeCaller> caller = CallerOf(request->session_id());
+  absl::StatusOr<GazeCaller> caller = CallerOf(*context, request->session_id());
   if (!caller.ok()) return Refuse(reactor, "Pause", "", caller.status());
   const std::string id = caller->pilot.participant_id;
   Submit(reactor, "Pause", id,

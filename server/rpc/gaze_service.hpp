@@ -2,7 +2,7 @@
 
 #include "saccade/v1/gaze.grpc.pb.h"
 #include "server/rpc/backend.hpp"
-#include "server/rpc/session_table.hpp"
+#include "server/rpc/gatekeeper.hpp"
 
 namespace saccade {
 
@@ -10,7 +10,7 @@ namespace saccade {
 /// threads and never block.
 class GazeService final : public v1::GazeService::CallbackService {
  public:
-  GazeService(Backend& backend, SessionTable& sessions) : backend_(backend), sessions_(sessions) {}
+  GazeService(Backend& backend, Gatekeeper& gate) : backend_(backend), gate_(gate) {}
 
  private:
   using Context = grpc::CallbackServerContext;
@@ -41,7 +41,7 @@ class GazeService final : public v1::GazeService::CallbackService {
   Reactor* Pause(Context* context, const v1::PauseRequest* request,
                  v1::PauseResponse* response) override;
 
-  absl::StatusOr<GazeCaller> CallerOf(const std::string& session_id);
+  absl::StatusOr<GazeCaller> CallerOf(const Context& context, const std::string& session_id);
   template <typename Request, typename Response>
   Reactor* Steer(Context* context, const Request* request, Response* response, const char* method,
                  SteerGaze::What what);
@@ -49,7 +49,7 @@ class GazeService final : public v1::GazeService::CallbackService {
               GazeCommand command);
 
   Backend& backend_;
-  SessionTable& sessions_;
+  Gatekeeper& gate_;
 };
 
 }  // namespace saccade

@@ -48,6 +48,10 @@ grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
                                           const v1::GetMapRequest* /*request*/,
                                           v1::GetMapResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (absl::Status often = gate_.Anyone(*context, Toll::kRead); !often.ok()) {
+    reactor->Finish(ToGrpc(often));
+    return reactor;
+  }
   const std::optional<TrackedEvent> newest = hub_.newest();
   if (newest) {
     *response->mutable_map() = FullMap(*newest->snapshot);
@@ -61,7 +65,8 @@ grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context
                                             const v1::ResetMapRequest* request,
                                             v1::ResetMapResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session = sessions_.FindEditor(request->session_id());
+  const absl::StatusOr<Session> session =
+      gate_.Editor(*context, Toll::kReset, request->session_id());
   const std::string id = session.ok() ? session->participant_id : "";
   absl::Status status = session.status();
   if (status.ok()) {
@@ -84,7 +89,8 @@ grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* contex
                                              v1::ExportMapResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const std::optional<TrackedEvent> newest = hub_.newest();
-  absl::Status status = newest ? absl::OkStatus() : NoMapYet();
+  absl::Status status = gate_.Anyone(*context, Toll::kRead);
+  if (status.ok() && !newest) status = NoMapYet();
   if (request->format() != v1::ExportMapRequest::FORMAT_PLY &&
       request->format() != v1::ExportMapRequest::FORMAT_UNSPECIFIED) {
     status = absl::InvalidArgumentError(

@@ -2,7 +2,7 @@
 
 #include "saccade/v1/map.grpc.pb.h"
 #include "server/rpc/backend.hpp"
-#include "server/rpc/session_table.hpp"
+#include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/stream_hub.hpp"
 
 namespace saccade {
@@ -11,8 +11,8 @@ namespace saccade {
 /// Handlers never block.
 class MapService final : public v1::MapService::CallbackService {
  public:
-  MapService(Backend& backend, StreamHub& hub, SessionTable& sessions)
-      : backend_(backend), hub_(hub), sessions_(sessions) {}
+  MapService(Backend& backend, StreamHub& hub, Gatekeeper& gate)
+      : backend_(backend), hub_(hub), gate_(gate) {}
 
  private:
   grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context,
@@ -27,7 +27,7 @@ class MapService final : public v1::MapService::CallbackService {
 
   Backend& backend_;
   StreamHub& hub_;
-  SessionTable& sessions_;
+  Gatekeeper& gate_;
 };
 
 }  // namespace saccade

@@ -5,7 +5,9 @@
 #include <grpcpp/grpcpp.h>
 
 #include "server/rpc/annotation_service.hpp"
+#include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/gaze_service.hpp"
+#include "server/rpc/grpc_listener.hpp"
 #include "server/rpc/map_service.hpp"
 #include "server/rpc/session_service.hpp"
 
@@ -26,12 +28,14 @@ void SetArguments(const RpcServerOptions& options, grpc::ServerBuilder& builder)
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 256);
-  // A second server on the same port fails instead of taking half of the calls.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  // Who connects and says nothing, or has said nothing for long, holds a descriptor.
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 10'000);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, 120'000);
   // Only reflection is synchronous.
   builder.SetSyncServerOption(grpc::ServerBuilder::SyncServerOption::NUM_CQS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::SyncServerOption::MIN_POLLERS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::SyncServerOption::MAX_POLLERS, 1);
+  builder.SetResourceQuota(grpc::ResourceQuota("rpc").SetMaxThreads(options.max_threads));
 }
 
 }  // namespace
@@ -41,12 +45,13 @@ class RpcServer::Impl {
   Impl(const RpcServerOptions& options, Backend& backend, StreamHub& hub)
       : hub_(hub),
         sessions_(
-            options.max_sessions,
+            options.sessions,
             [&backend](const std::string& id) { return backend.Submit(ForgetSession{id}).ok(); }),
-        session_service_(backend, hub, sessions_),
-        annotation_service_(backend, hub, sessions_),
-        map_service_(backend, hub, sessions_),
-        gaze_service_(backend, sessions_) {}
+        gate_(sessions_, options.limits),
+        session_service_(backend, hub, gate_),
+        annotation_service_(backend, gate_),
+        map_service_(backend, hub, gate_),
+        gaze_service_(backend, gate_) {}
   ~Impl() { Stop(std::chrono::milliseconds(500)); }
 
   absl::Status Start(const RpcServerOptions& options) {
@@ -54,31 +59,38 @@ class RpcServer::Impl {
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
     SetArguments(options, builder);
-    const bool v6 = options.host.find(':') != std::string::npos;
-    const std::string address =
-        absl::StrCat(v6 ? "[" : "", options.host, v6 ? "]:" : ":", options.port);
-    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port_);
+    absl::StatusOr<std::unique_ptr<GrpcListener>> listener =
+        GrpcListener::Bind(options.host, options.port);
+    if (!listener.ok()) {
+      return absl::UnavailableError(absl::StrCat("grpc: cannot listen on ", options.host, " port ",
+                                                 options.port, ": ", listener.status().message(),
+                                                 "; choose another with --grpc"));
+    }
+    std::unique_ptr<GrpcListener::Acceptor> acceptor =
+        builder.experimental().AddExternalConnectionAcceptor(
+            grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+            grpc::InsecureServerCredentials());
     builder.RegisterService(&session_service_);
     builder.RegisterService(&annotation_service_);
     builder.RegisterService(&map_service_);
     builder.RegisterService(&gaze_service_);
     server_ = builder.BuildAndStart();
-    if (server_ == nullptr || port_ == 0) {
-      return absl::UnavailableError(absl::StrCat("grpc: cannot listen on ", address,
-                                                 ": is it in use? choose another with --grpc"));
-    }
+    if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
+    listener_ = *std::move(listener);
+    listener_->Start(std::move(acceptor));
     return absl::OkStatus();
   }
 
   void Stop(std::chrono::milliseconds grace) {
     if (server_ == nullptr) return;
+    listener_->Stop();
     hub_.CloseAll(absl::UnavailableError("the server is shutting down"));
     server_->Shutdown(std::chrono::system_clock::now() + grace);
     server_->Wait();
     server_ = nullptr;
   }
 
-  int port() const { return port_; }
+  int port() const { return listener_->port(); }
   std::shared_ptr<grpc::Channel> InProcessChannel() {
     return server_->InProcessChannel(grpc::ChannelArguments());
   }
@@ -86,11 +98,12 @@ class RpcServer::Impl {
  private:
   StreamHub& hub_;
   SessionTable sessions_;
+  Gatekeeper gate_;
   SessionService session_service_;
   AnnotationService annotation_service_;
   MapService map_service_;
   GazeService gaze_service_;
-  int port_ = 0;
+  std::unique_ptr<GrpcListener> listener_;  // outlives the server, to which its acceptor belongs
   std::unique_ptr<grpc::Server> server_;
 };
 

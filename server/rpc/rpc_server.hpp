@@ -6,7 +6,9 @@
 #include <memory>
 #include <string>
 
+#include "server/rpc/admission.hpp"
 #include "server/rpc/backend.hpp"
+#include "server/rpc/session_table.hpp"
 #include "server/rpc/stream_hub.hpp"
 
 namespace grpc {
@@ -20,10 +22,14 @@ struct RpcServerOptions {
   int port = 50051;  // 0: any free one, see RpcServer::port
   /// A stroke of 2000 points is 50 KB. Larger requests: RESOURCE_EXHAUSTED, unparsed.
   int max_request_bytes = 256 * 1024;
-  std::size_t max_sessions = 1000;
+  SessionTableOptions sessions;
+  RpcLimits limits;
   /// A peer that answers no ping for so long is gone, even if its socket never says so.
   std::chrono::milliseconds keepalive_time{10'000};
   std::chrono::milliseconds keepalive_timeout{20'000};
+  /// Reflection is served by threads that wait for their client: no more than these, further ones
+  /// get RESOURCE_EXHAUSTED.
+  int max_threads = 16;
 };
 
 /// The gRPC server: every service of saccade.v1, health and reflection, without TLS.

@@ -25,14 +25,16 @@ class RefusedStream final : public grpc::ServerWriteReactor<v1::Event> {
 
 }  // namespace
 
-SessionService::SessionService(Backend& backend, StreamHub& hub, SessionTable& sessions)
-    : backend_(backend), hub_(hub), sessions_(sessions), started_ns_(MonotonicNow()) {}
+SessionService::SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gate)
+    : backend_(backend), hub_(hub), gate_(gate), started_ns_(MonotonicNow()) {}
 
 grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* context,
                                                const v1::JoinRequest* request,
                                                v1::JoinResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session = sessions_.Join(*request);
+  const absl::Status often = gate_.Anyone(*context, Toll::kJoin);
+  const absl::StatusOr<Session> session =
+      often.ok() ? gate_.sessions().Join(*request) : absl::StatusOr<Session>(often);
   Audit("Join", session.ok() ? session->participant_id : "", session.status());
   if (!session.ok()) return Finish(reactor, session.status());
   const ServerFacts& facts = backend_.facts();
@@ -46,20 +48,22 @@ grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* cont
 }
 
 grpc::ServerWriteReactor<v1::Event>* SessionService::Subscribe(
-    grpc::CallbackServerContext* /*context*/, const v1::SubscribeRequest* request) {
-  const absl::StatusOr<Session> session = sessions_.Find(request->session_id());
+    grpc::CallbackServerContext* context, const v1::SubscribeRequest* request) {
+  const absl::StatusOr<Session> session =
+      gate_.Member(*context, Toll::kSubscribe, request->session_id());
   if (!session.ok()) return new RefusedStream(session.status());
   const absl::StatusOr<SubscriptionOptions> options = SubscriptionOptions::FromProto(*request);
   Audit("Subscribe", session->participant_id, options.status());
   if (!options.ok()) return new RefusedStream(options.status());
-  return StreamWriter::Open(hub_, *session, *options);
+  return StreamWriter::Open(hub_, *session, *options, *context, gate_.sessions().Hold(session->id));
 }
 
 grpc::ServerUnaryReactor* SessionService::Acknowledge(grpc::CallbackServerContext* context,
                                                       const v1::AcknowledgeRequest* request,
                                                       v1::AcknowledgeResponse* /*response*/) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session = sessions_.Find(request->session_id());
+  // Costs nothing that could be limited.
+  const absl::StatusOr<Session> session = gate_.sessions().Find(request->session_id());
   if (!session.ok()) return Finish(reactor, session.status());
   return Finish(reactor,
                 hub_.Acknowledge(session->id, request->sequence(), request->request_key_frame()));
@@ -78,6 +82,9 @@ grpc::ServerUnaryReactor* SessionService::GetFrame(grpc::CallbackServerContext* 
                                                    const v1::GetFrameRequest* request,
                                                    v1::GetFrameResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (absl::Status often = gate_.Anyone(*context, Toll::kStill); !often.ok()) {
+    return Finish(reactor, often);
+  }
   if (!v1::VideoView_IsValid(request->view())) {
     return Finish(reactor, absl::InvalidArgumentError(absl::StrCat(
                                "view: unknown view ", static_cast<int>(request->view()))));
@@ -102,6 +109,9 @@ grpc::ServerUnaryReactor* SessionService::GetFrame(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* SessionService::GetStatus(grpc::CallbackServerContext* context,
                                                     const v1::GetStatusRequest* /*request*/,
                                                     v1::GetStatusResponse* response) {
+  if (absl::Status often = gate_.Anyone(*context, Toll::kRead); !often.ok()) {
+    return Finish(context->DefaultReactor(), often);
+  }
   if (const std::optional<TrackedEvent> newest = hub_.newest()) {
     *response->mutable_pose() = wire::ToProtoPose(*newest->snapshot, newest->stages.captured_ns);
     response->set_map_features(static_cast<std::uint32_t>(newest->snapshot->features.size()));

@@ -4,7 +4,7 @@
 
 #include "saccade/v1/session.grpc.pb.h"
 #include "server/rpc/backend.hpp"
-#include "server/rpc/session_table.hpp"
+#include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/stream_hub.hpp"
 
 namespace saccade {
@@ -12,7 +12,7 @@ namespace saccade {
 /// Joining, the stream, stills, clock. Handlers run on gRPC's threads and never block.
 class SessionService final : public v1::SessionService::CallbackService {
  public:
-  SessionService(Backend& backend, StreamHub& hub, SessionTable& sessions);
+  SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gate);
 
  private:
   grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context,
@@ -35,7 +35,7 @@ class SessionService final : public v1::SessionService::CallbackService {
 
   Backend& backend_;
   StreamHub& hub_;
-  SessionTable& sessions_;
+  Gatekeeper& gate_;
   const Timestamp started_ns_;
 };
 

@@ -1,11 +1,12 @@
 #include "server/rpc/session_table.hpp"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
-#include <algorithm>
 #include <random>
 
+#include "server/pipeline/busy.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade {
@@ -19,37 +20,80 @@ std::string NewUuid() {
                          0x8000 | (c >> 16 & 0x3fff), c & 0xffff, d);
 }
 
+// Names go into others' lists and into the log: one line, and nothing that turns text about.
+absl::Status CheckName(const std::string& name) {
+  absl::Status text = wire::CheckText(name, wire::kMaxNameBytes, "display_name");
+  if (!text.ok()) return text;
+  // Line and paragraph separators, marks and overrides of direction, as UTF-8.
+  static constexpr absl::string_view kTurning[] = {
+      "\xe2\x80\xa8", "\xe2\x80\xa9", "\xe2\x80\x8e", "\xe2\x80\x8f", "\xe2\x80\xaa",
+      "\xe2\x80\xab", "\xe2\x80\xac", "\xe2\x80\xad", "\xe2\x80\xae", "\xe2\x81\xa6",
+      "\xe2\x81\xa7", "\xe2\x81\xa8", "\xe2\x81\xa9", "\xc2\x85",     "\n"};
+  for (const absl::string_view one : kTurning) {
+    if (absl::StrContains(name, one)) {
+      return absl::InvalidArgumentError(
+          "display_name: holds a line break or a mark that turns text about: leave it out");
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
-absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request) {
-  absl::Status name = wire::CheckText(request.display_name(), wire::kMaxNameBytes, "display_name");
+absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Timestamp now_ns) {
+  absl::Status name = CheckName(request.display_name());
   if (!name.ok()) return name;
   if (!v1::Role_IsValid(request.role())) {
     return absl::InvalidArgumentError(
         absl::StrCat("role: unknown role ", static_cast<int>(request.role())));
   }
+  const std::string& resumed = request.resume_session_id();
+  if (!resumed.empty()) {
+    absl::Status uuid = wire::CheckUuid(resumed, "resume_session_id");
+    if (!uuid.ok()) return uuid;
+  }
   Session session;
-  session.id = NewUuid();
-  session.participant_id = NewUuid();
   session.display_name = request.display_name().empty() ? "guest" : request.display_name();
   if (request.role() != v1::ROLE_UNSPECIFIED) session.role = request.role();
   const std::lock_guard lock(mutex_);
-  MakeRoom();
-  sessions_[session.id] = {session, MonotonicNow()};
+  if (const auto known = sessions_.find(resumed); known != sessions_.end()) {
+    Slot& slot = known->second;
+    session.id = slot.session.id;
+    session.participant_id = slot.session.participant_id;
+    slot.session = session;
+    slot.used_ns = now_ns;
+    slot.used = true;
+    return session;
+  }
+  if (!MakeRoom(now_ns)) {
+    return BusyError(absl::StrCat("sessions: ", sessions_.size(), " are in use, as many as may be"),
+                     options_.unused_ns);
+  }
+  session.id = NewUuid();
+  session.participant_id = NewUuid();
+  sessions_[session.id] = {session, now_ns};
   return session;
 }
 
-void SessionTable::MakeRoom() {
-  if (sessions_.size() < max_sessions_) return;
-  const auto oldest = std::min_element(
-      sessions_.begin(), sessions_.end(),
-      [](const auto& a, const auto& b) { return a.second.used_ns < b.second.used_ns; });
-  gone_.push_back(oldest->second.session.participant_id);
-  sessions_.erase(oldest);
+// Who joined and did nothing goes first.
+bool SessionTable::MakeRoom(Timestamp now_ns) {
+  if (sessions_.size() < options_.max_sessions) return true;
+  auto chosen = sessions_.end();
+  for (auto at = sessions_.begin(); at != sessions_.end(); ++at) {
+    const Slot& slot = at->second;
+    const Timestamp silent_ns = now_ns - slot.used_ns;
+    if (slot.holds > 0 || silent_ns < (slot.used ? options_.idle_ns : options_.unused_ns)) continue;
+    const auto rank = [](const Slot& one) { return std::pair(one.used, one.used_ns); };
+    if (chosen == sessions_.end() || rank(slot) < rank(chosen->second)) chosen = at;
+  }
+  if (chosen == sessions_.end()) return false;
+  if (chosen->second.used) gone_.push_back(chosen->second.session.participant_id);
+  sessions_.erase(chosen);
   std::erase_if(gone_, [this](const std::string& id) { return !on_gone_ || on_gone_(id); });
+  return true;
 }
 
-absl::StatusOr<Session> SessionTable::Find(const std::string& session_id) {
+absl::StatusOr<Session> SessionTable::Find(const std::string& session_id, Timestamp now_ns) {
   absl::Status uuid = wire::CheckUuid(session_id, "session_id");
   if (!uuid.ok()) return uuid;
   const std::lock_guard lock(mutex_);
@@ -57,16 +101,33 @@ absl::StatusOr<Session> SessionTable::Find(const std::string& session_id) {
   if (at == sessions_.end()) {
     return absl::NotFoundError("session_id: unknown to this server: call Join again");
   }
-  at->second.used_ns = MonotonicNow();
+  at->second.used_ns = now_ns;
+  at->second.used = true;
   return at->second.session;
 }
 
-absl::StatusOr<Session> SessionTable::FindEditor(const std::string& session_id) {
-  absl::StatusOr<Session> session = Find(session_id);
+absl::StatusOr<Session> SessionTable::FindEditor(const std::string& session_id, Timestamp now_ns) {
+  absl::StatusOr<Session> session = Find(session_id, now_ns);
   if (session.ok() && session->role == v1::ROLE_VIEWER) {
     return absl::PermissionDeniedError("session_id: a viewer changes nothing: join as expert");
   }
   return session;
+}
+
+std::shared_ptr<void> SessionTable::Hold(const std::string& session_id) {
+  const std::lock_guard lock(mutex_);
+  const auto at = sessions_.find(session_id);
+  if (at == sessions_.end()) return nullptr;
+  ++at->second.holds;
+  return {this, [this, session_id](void*) { Release(session_id); }};
+}
+
+void SessionTable::Release(const std::string& session_id) {
+  const std::lock_guard lock(mutex_);
+  const auto at = sessions_.find(session_id);
+  if (at == sessions_.end()) return;
+  --at->second.holds;
+  at->second.used_ns = MonotonicNow();
 }
 
 }  // namespace saccade

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -22,34 +23,51 @@ struct Session {
   v1::Role role = v1::ROLE_EXPERT;
 };
 
-/// Who joined. Bounded: above `max_sessions` the one unused for longest goes. Thread safe.
+struct SessionTableOptions {
+  std::size_t max_sessions = 1000;
+  // Where the table is full, these make room, and only these: who works is never put out by who
+  // joins.
+  Timestamp unused_ns = 5'000'000'000;  // joined so long ago, and never heard of again
+  Timestamp idle_ns = 600'000'000'000;  // without a stream, and silent for so long
+};
+
+/// Who joined. Bounded. Thread safe.
 class SessionTable {
  public:
-  /// Told the participant_id of each session that goes, so that what is kept for it elsewhere goes
-  /// too; false: not now, and it is told again with the next one. Called from Join(); must not
-  /// block or call back.
+  /// Told the participant_id of each session that goes and was used, so that what is kept for it
+  /// elsewhere goes too; false: not now, and it is told again with the next one. Called from
+  /// Join(); must not block or call back.
   using OnGone = std::function<bool(const std::string& participant_id)>;
 
-  explicit SessionTable(std::size_t max_sessions = 1000, OnGone on_gone = nullptr)
-      : max_sessions_(max_sessions), on_gone_(std::move(on_gone)) {}
+  explicit SessionTable(const SessionTableOptions& options = {}, OnGone on_gone = nullptr)
+      : options_(options), on_gone_(std::move(on_gone)) {}
 
-  /// InvalidArgument names the field.
-  absl::StatusOr<Session> Join(const v1::JoinRequest& request);
+  /// Makes a session, or goes on with `request.resume_session_id` if there is one of that id.
+  ///   InvalidArgument    names the field
+  ///   ResourceExhausted  the table is full of sessions in use
+  absl::StatusOr<Session> Join(const v1::JoinRequest& request, Timestamp now_ns = MonotonicNow());
 
   /// NotFound: never joined, or before this server started. Counts as use.
-  absl::StatusOr<Session> Find(const std::string& session_id);
+  absl::StatusOr<Session> Find(const std::string& session_id, Timestamp now_ns = MonotonicNow());
 
   /// As Find; PermissionDenied for those who may only look.
-  absl::StatusOr<Session> FindEditor(const std::string& session_id);
+  absl::StatusOr<Session> FindEditor(const std::string& session_id,
+                                     Timestamp now_ns = MonotonicNow());
+
+  /// While what is returned lives (a stream), the session stays. It must not outlive the table.
+  std::shared_ptr<void> Hold(const std::string& session_id);
 
  private:
   struct Slot {
     Session session;
     Timestamp used_ns = 0;
+    bool used = false;  // beyond Join
+    int holds = 0;
   };
-  void MakeRoom();
+  bool MakeRoom(Timestamp now_ns);
+  void Release(const std::string& session_id);
 
-  const std::size_t max_sessions_;
+  const SessionTableOptions options_;
   const OnGone on_gone_;
   std::mutex mutex_;
   std::vector<std::string> gone_;  // not told yet

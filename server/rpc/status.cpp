@@ -4,7 +4,11 @@
 #include <absl/time/clock.h>
 #include <absl/time/time.h>
 
+#include <atomic>
 #include <cstdio>
+#include <optional>
+
+#include "server/pipeline/busy.hpp"
 
 namespace saccade {
 namespace {
@@ -25,18 +29,19 @@ std::string Field(unsigned number, const std::string& payload) {
   return out + payload;
 }
 
-// google.rpc.Status with one google.rpc.BadRequest.FieldViolation; those messages are not in
-// Debian.
-std::string BadRequestDetails(const std::string& field, const std::string& description,
-                              const std::string& message) {
-  const std::string violation = Field(1, field) + Field(2, description);
-  const std::string bad_request = Field(1, violation);
+// google.rpc.Status with one detail; those messages are not in Debian.
+std::string Details(const absl::Status& status, const char* type, const std::string& detail) {
   const std::string any =
-      Field(1, "type.googleapis.com/google.rpc.BadRequest") + Field(2, bad_request);
+      Field(1, absl::StrCat("type.googleapis.com/google.rpc.", type)) + Field(2, detail);
   std::string code;
   AppendVarint(1u << 3, code);
-  AppendVarint(static_cast<std::uint64_t>(absl::StatusCode::kInvalidArgument), code);
-  return code + Field(2, message) + Field(3, any);
+  AppendVarint(static_cast<std::uint64_t>(status.raw_code()), code);
+  return code + Field(2, std::string(status.message())) + Field(3, any);
+}
+
+// A google.rpc.BadRequest with one FieldViolation.
+std::string BadRequest(const std::string& field, const std::string& description) {
+  return Field(1, Field(1, field) + Field(2, description));
 }
 
 }  // namespace
@@ -45,17 +50,44 @@ grpc::Status ToGrpc(const absl::Status& status) {
   if (status.ok()) return grpc::Status::OK;
   const auto code = static_cast<grpc::StatusCode>(status.raw_code());
   const std::string message(status.message());
+  if (const std::optional<std::string> retry = RetryInfoOf(status)) {
+    return {code, message, Details(status, "RetryInfo", *retry)};
+  }
   const std::size_t colon = message.find(": ");
   if (!absl::IsInvalidArgument(status) || colon == std::string::npos) return {code, message};
   return {code, message,
-          BadRequestDetails(message.substr(0, colon), message.substr(colon + 2), message)};
+          Details(status, "BadRequest",
+                  BadRequest(message.substr(0, colon), message.substr(colon + 2)))};
 }
 
-void Audit(const char* method, const std::string& session_id, const absl::Status& status) {
+namespace {
+
+// Of a flood one line a second is enough: how many that came too often have no line of their own.
+bool IsWorthALine(const absl::Status& status, std::uint64_t& unsaid) {
+  static std::atomic<std::uint64_t> refused = 0;
+  static std::atomic<Timestamp> said_ns = 0;
+  if (!RetryInfoOf(status)) return true;
+  const Timestamp now_ns = MonotonicNow();
+  Timestamp last_ns = said_ns;
+  const bool due = now_ns - last_ns >= 1'000'000'000;
+  if (due && said_ns.compare_exchange_strong(last_ns, now_ns)) {
+    unsaid = refused.exchange(0);
+    return true;
+  }
+  ++refused;
+  return false;
+}
+
+}  // namespace
+
+void Audit(const char* method, const std::string& participant_id, const absl::Status& status) {
+  std::uint64_t unsaid = 0;
+  if (!IsWorthALine(status, unsaid)) return;
   const std::string time =
       absl::FormatTime("%Y-%m-%dT%H:%M:%E3SZ", absl::Now(), absl::UTCTimeZone());
-  std::fprintf(stderr, "%s rpc %s session=%.36s %s\n", time.c_str(), method, session_id.c_str(),
-               status.ok() ? "ok" : status.ToString().c_str());
+  std::fprintf(stderr, "%s rpc %s participant=%.36s %s%s\n", time.c_str(), method,
+               participant_id.c_str(), status.ok() ? "ok" : status.ToString().c_str(),
+               unsaid == 0 ? "" : absl::StrCat(" (and ", unsaid, " more)").c_str());
 }
 
 }  // namespace saccade

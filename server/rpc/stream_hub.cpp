@@ -1,5 +1,7 @@
 #include "server/rpc/stream_hub.hpp"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <array>
 
@@ -12,8 +14,9 @@ constexpr std::size_t kBacklog = 256;
 
 }  // namespace
 
-StreamHub::StreamHub()
-    : presence_(std::make_shared<v1::PresenceEvent>()),
+StreamHub::StreamHub(Timestamp silence_ns)
+    : silence_ns_(silence_ns),
+      presence_(std::make_shared<v1::PresenceEvent>()),
       runner_({.capacity = kBacklog, .when_full = WhenFull::kDropOldest},
               [this](const Message& message) { Distribute(message); }) {}
 
@@ -51,7 +54,27 @@ void StreamHub::OnEndOfSource(std::uint64_t frames) {
   runner_.Post(EndOfSource{frames}).IgnoreError();
 }
 
+void StreamHub::AbandonTheSilent(Timestamp now_ns) {
+  std::vector<std::shared_ptr<Subscriber>> silent;
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(streams_, [&](const std::shared_ptr<Subscriber>& stream) {
+      const std::optional<Timestamp> since_ns = stream->unacknowledged_since();
+      if (!since_ns || now_ns - *since_ns < silence_ns_) return false;
+      silent.push_back(stream);
+      return true;
+    });
+  }
+  for (const auto& stream : silent) {
+    stream->Abandon(absl::DeadlineExceededError(absl::StrCat(
+        "no event was acknowledged for ", silence_ns_ / 1'000'000'000, " s: subscribe again")));
+  }
+  if (!silent.empty()) StreamsChanged();
+}
+
 void StreamHub::Distribute(const Message& message) {
+  // Statistics come once a second.
+  if (std::holds_alternative<EngineStatistics>(message)) AbandonTheSilent(MonotonicNow());
   std::optional<NumberedState> state;
   if (const auto* tracked = std::get_if<TrackedEvent>(&message)) {
     state = log_.Next(*tracked, MonotonicNow());
@@ -133,6 +156,7 @@ void StreamHub::Remove(const Subscriber* subscriber) {
 // Who is there changed: tell the others, and the encoder whether anybody watches.
 void StreamHub::StreamsChanged() {
   auto presence = std::make_shared<v1::PresenceEvent>();
+  auto present = std::make_shared<ParticipantSet>();
   std::array<bool, kVideoViews> wanted{};
   {
     const std::lock_guard lock(mutex_);
@@ -141,9 +165,11 @@ void StreamHub::StreamsChanged() {
       participant.set_participant_id(stream->session().participant_id);
       participant.set_display_name(stream->session().display_name);
       participant.set_role(stream->session().role);
+      present->insert(stream->session().participant_id);
       if (stream->wants_video()) wanted[static_cast<std::size_t>(stream->view())] = true;
     }
     presence_ = presence;
+    backend_->SetPresence(std::move(present));
     for (int view = 0; view < kVideoViews; ++view) {
       backend_->SetVideoDemand(static_cast<VideoView>(view),
                                wanted[static_cast<std::size_t>(view)]);

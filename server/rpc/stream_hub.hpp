@@ -44,6 +44,14 @@ class Subscriber {
   virtual void Pump() = 0;
   /// Ends the stream with `status`.
   virtual void Close(const absl::Status& status) = 0;
+  /// The same for one that is not heard of any more: also a write that it does not take.
+  virtual void Abandon(const absl::Status& status) = 0;
+
+  /// Since when it owes an acknowledgement; nothing if it owes none.
+  std::optional<Timestamp> unacknowledged_since() {
+    const std::lock_guard lock(mutex_);
+    return subscription_.unacknowledged_since();
+  }
 
  protected:
   const Session session_;
@@ -55,7 +63,9 @@ class Subscriber {
 /// hub's own offers to the streams, so neither tracker nor encoder ever waits for a client.
 class StreamHub : public EventSink {
  public:
-  StreamHub();
+  /// A stream whose events nobody acknowledges for `silence_ns` ends (DeadlineExceeded): who stands
+  /// behind it is gone, whatever its socket says.
+  explicit StreamHub(Timestamp silence_ns = 30'000'000'000);
   ~StreamHub() override;
 
   /// Where key frames are asked for. Before the first Add; `backend` outlives the hub's streams.
@@ -92,12 +102,14 @@ class StreamHub : public EventSink {
                                std::shared_ptr<const GazeSnapshot>, EndOfSource, PresenceChanged>;
 
   void Distribute(const Message& message);
+  void AbandonTheSilent(Timestamp now_ns);
   /// False: closed. `replaced` is the stream that the same session had.
   bool Insert(const std::shared_ptr<Subscriber>& subscriber, std::shared_ptr<Subscriber>& replaced);
   std::vector<std::shared_ptr<Subscriber>> Streams() const;
   std::optional<NumberedState> numbered() const;
   void StreamsChanged();
 
+  const Timestamp silence_ns_;
   Backend* backend_ = nullptr;
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Subscriber>> streams_;

@@ -5,8 +5,9 @@
 namespace saccade {
 
 StreamWriter* StreamWriter::Open(StreamHub& hub, Session session,
-                                 const SubscriptionOptions& options) {
-  auto* writer = new StreamWriter(hub, std::move(session), options);
+                                 const SubscriptionOptions& options,
+                                 grpc::CallbackServerContext& context, std::shared_ptr<void> hold) {
+  auto* writer = new StreamWriter(hub, std::move(session), options, context, std::move(hold));
   writer->self_.reset(writer);
   hub.Add(writer->self_);
   return writer;
@@ -41,6 +42,17 @@ void StreamWriter::Close(const absl::Status& status) {
   Finish(ToGrpc(status));
 }
 
+void StreamWriter::Abandon(const absl::Status& status) {
+  Close(status);
+  {
+    const std::lock_guard lock(mutex_);
+    if (!writing_) return;
+  }
+  // A write that nobody reads never ends by itself. Not under mutex_: gRPC may call back from here.
+  const std::lock_guard lock(context_mutex_);
+  if (!done_) context_.TryCancel();
+}
+
 void StreamWriter::OnWriteDone(bool ok) {
   std::optional<absl::Status> finish;
   {
@@ -67,6 +79,10 @@ void StreamWriter::OnCancel() {
 }
 
 void StreamWriter::OnDone() {
+  {
+    const std::lock_guard lock(context_mutex_);
+    done_ = true;
+  }
   hub_.Remove(this);
   Audit("Subscribe/end", session_.participant_id, absl::OkStatus());
   // The hub may still hold a reference for the length of one Distribute.

@@ -3,6 +3,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <memory>
+#include <mutex>
 
 #include "saccade/v1/session.pb.h"
 #include "server/rpc/stream_hub.hpp"
@@ -13,20 +14,31 @@ namespace saccade {
 /// Owns itself from Open until gRPC reports OnDone.
 class StreamWriter : public grpc::ServerWriteReactor<v1::Event>, public Subscriber {
  public:
-  static StreamWriter* Open(StreamHub& hub, Session session, const SubscriptionOptions& options);
+  /// `context` belongs to the call; `hold` keeps the session while the stream is open.
+  static StreamWriter* Open(StreamHub& hub, Session session, const SubscriptionOptions& options,
+                            grpc::CallbackServerContext& context, std::shared_ptr<void> hold);
 
   void Pump() override;
   void Close(const absl::Status& status) override;
+  void Abandon(const absl::Status& status) override;
 
  private:
-  StreamWriter(StreamHub& hub, Session session, const SubscriptionOptions& options)
-      : Subscriber(std::move(session), options), hub_(hub) {}
+  StreamWriter(StreamHub& hub, Session session, const SubscriptionOptions& options,
+               grpc::CallbackServerContext& context, std::shared_ptr<void> hold)
+      : Subscriber(std::move(session), options),
+        hub_(hub),
+        context_(context),
+        hold_(std::move(hold)) {}
 
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
   void OnDone() override;
 
   StreamHub& hub_;
+  std::recursive_mutex context_mutex_;    // held to use context_ from outside gRPC's callbacks
+  grpc::CallbackServerContext& context_;  // until done_
+  bool done_ = false;
+  const std::shared_ptr<void> hold_;
   std::shared_ptr<StreamWriter> self_;
   v1::Event event_;  // being written while writing_
   bool writing_ = false;

@@ -88,12 +88,17 @@ void Subscription::OfferPresence(std::shared_ptr<const v1::PresenceEvent> presen
   presence_ = std::move(presence);
 }
 
-absl::Status Subscription::Acknowledge(std::uint64_t sequence, bool request_key_frame) {
+absl::Status Subscription::Acknowledge(std::uint64_t sequence, bool request_key_frame,
+                                       Timestamp now_ns) {
   if (sequence > sequence_) {
     return absl::InvalidArgumentError(
         absl::StrCat("sequence: ", sequence, " was not sent yet; the last one is ", sequence_));
   }
-  acknowledged_ = std::max(acknowledged_, sequence);
+  if (sequence > acknowledged_) {
+    acknowledged_ = sequence;
+    unacknowledged_since_ = now_ns;
+    if (acknowledged_ == sequence_) unacknowledged_since_.reset();
+  }
   if (request_key_frame) video_.RequireKeyFrame();
   return absl::OkStatus();
 }
@@ -109,6 +114,7 @@ bool Subscription::Next(Timestamp now_ns, v1::Event& event) {
     event.Clear();
     if (!Fill(static_cast<Kind>(kind), now_ns, event)) continue;
     event.set_sequence(++sequence_);
+    if (!unacknowledged_since_) unacknowledged_since_ = now_ns;
     last_kind_ = kind;
     return true;
   }
@@ -171,7 +177,11 @@ bool Subscription::FillVideo(Timestamp now_ns, v1::Event& event) {
   if (!Has(v1::TOPIC_VIDEO)) return false;
   const std::shared_ptr<const VideoPacket> packet = video_.Take(now_ns);
   if (packet == nullptr) return false;
-  *event.mutable_access_unit() = AccessUnitToProto(*packet, now_ns);
+  v1::AccessUnit& unit = *event.mutable_access_unit() = AccessUnitToProto(*packet, now_ns);
+  // Of the packet's own frame, not of the newest: a dot belongs to the picture it was measured in.
+  if (Has(v1::TOPIC_MAP)) {
+    *unit.mutable_features() = wire::ToProtoFeatures(*packet->tracked.snapshot);
+  }
   return true;
 }
 

@@ -46,7 +46,8 @@ class Subscription {
   }
 
   /// InvalidArgument: `sequence` was never sent.
-  absl::Status Acknowledge(std::uint64_t sequence, bool request_key_frame);
+  absl::Status Acknowledge(std::uint64_t sequence, bool request_key_frame,
+                           Timestamp now_ns = MonotonicNow());
 
   /// Fills the next event, if there is one and the window allows it. Kinds take turns, so that
   /// video cannot starve the map; a new subscriber has annotations and map before any picture.
@@ -57,6 +58,8 @@ class Subscription {
 
   const SubscriptionOptions& options() const { return options_; }
   std::uint64_t last_sequence() const { return sequence_; }
+  /// Since when the oldest of what was sent, or the last acknowledgement, waits for the next one.
+  std::optional<Timestamp> unacknowledged_since() const { return unacknowledged_since_; }
 
  private:
   enum Kind { kAnnotations, kMap, kPresence, kGaze, kPose, kVideo, kStatistics, kEnd, kKinds };
@@ -73,6 +76,7 @@ class Subscription {
   const SubscriptionOptions options_;
   std::uint64_t sequence_ = 0;
   std::uint64_t acknowledged_ = 0;
+  std::optional<Timestamp> unacknowledged_since_;
   int last_kind_ = kKinds - 1;
 
   std::optional<NumberedState> state_;  // the newest

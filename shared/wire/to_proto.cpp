@@ -1,5 +1,7 @@
 #include "shared/wire/to_proto.hpp"
 
+#include <cmath>
+
 namespace saccade::wire {
 namespace {
 
@@ -224,6 +226,28 @@ v1::Anchor ToProto(const Anchor& anchor) {
   if (anchor.error_px) message.set_error_px(*anchor.error_px);
   message.set_reason(anchor.reason);
   if (anchor.pixel) *message.mutable_pixel() = ToProto(*anchor.pixel);
+  return message;
+}
+
+v1::FrameFeatures ToProtoFeatures(const MapSnapshot& snapshot) {
+  const auto sixteenths = [](double px) {
+    return static_cast<std::int32_t>(std::lround(16.0 * px));
+  };
+  v1::FrameFeatures message;
+  for (const FeatureSnapshot& feature : snapshot.features) {
+    if (!feature.pixel || !feature.pixel->allFinite()) continue;
+    const std::int32_t u = sixteenths(feature.pixel->x());
+    const std::int32_t v = sixteenths(feature.pixel->y());
+    if (feature.state == FeatureState::kMeasured) {
+      message.add_measured_ids(feature.id);
+      message.add_measured_px16(u);
+      message.add_measured_px16(v);
+    } else if (feature.state == FeatureState::kFailed) {
+      message.add_failed_ids(feature.id);
+      message.add_failed_px16(u);
+      message.add_failed_px16(v);
+    }
+  }
   return message;
 }
 

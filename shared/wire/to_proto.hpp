@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <optional>
 
+#include "saccade/v1/map.pb.h"
 #include "saccade/v1/session.pb.h"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
@@ -26,6 +27,9 @@ v1::AnnotationShape ToProto(AnnotationShape shape);
 
 /// `captured_ns`: the frame's exposure middle on the server's monotonic clock.
 v1::PoseEvent ToProtoPose(const MapSnapshot& snapshot, Timestamp captured_ns);
+
+/// What this very frame measured, and where it searched in vain [1/16 px of the raw picture].
+v1::FrameFeatures ToProtoFeatures(const MapSnapshot& snapshot);
 
 v1::Anchor ToProto(const Anchor& anchor);
 v1::Annotation ToProto(const Annotation& annotation);

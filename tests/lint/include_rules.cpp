@@ -51,6 +51,10 @@ const std::vector<Home>& Homes() {
       {"GL/osmesa.h", {"server/gl"}},
       {"EGL/", {"server/gl"}},
       {"GLFW/", {"client/view", "client/app"}},
+      {"hb.h", {"server/overlay"}},
+      {"ft2build.h", {"server/overlay"}},
+      {"fribidi.h", {"server/overlay"}},
+      {"fontconfig/", {"server/overlay"}},
       {"opencv2/videoio", {"server/decode"}},
       {"opencv2/highgui", {}},
   };

@@ -118,7 +118,7 @@ InProcessServer::InProcessServer(const InProcessOptions& options) {
   hub_.Connect(engine_.get());
   RpcServerOptions rpc_options;
   rpc_options.port = 0;
-  rpc_options.max_sessions = options.max_sessions;
+  rpc_options.sessions = options.sessions;
   rpc_ = Must(RpcServer::Start(rpc_options, *engine_, hub_));
   engine_->Start();
 }

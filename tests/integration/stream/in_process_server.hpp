@@ -18,7 +18,7 @@ struct InProcessOptions {
   int width = 320, height = 240;
   std::filesystem::path data_dir;  // empty: nothing is stored
   std::size_t mailbox = 64;
-  std::size_t max_sessions = 1000;
+  SessionTableOptions sessions;
   std::shared_ptr<Mount> mount;  // null: none
   /// Features that change in every frame, beside the 20 that stand still: so many a map of a desk
   /// sends anew.

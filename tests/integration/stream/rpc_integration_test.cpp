@@ -300,7 +300,7 @@ TEST(Rpc, WhoMayNotEditMayNotResetTheMap) {
 
 TEST(Rpc, TheHistoryOfASessionGoesWithIt) {
   testing::InProcessOptions options;
-  options.max_sessions = 2;
+  options.sessions = {.max_sessions = 2, .idle_ns = 0};
   InProcessServer server(options);
   TestClient client(server.address());
   v1::CreateAnnotationResponse created;

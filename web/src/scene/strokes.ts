@@ -1,7 +1,8 @@
 import { projectPolyline } from '../geometry/polyline';
 import { add, type Pixel, type Vec3 } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
-import { type Annotation, doNotTrust, type Shape } from '../session/types';
+import { type Annotation, doNotTrust, type Scale, type Shape } from '../session/types';
+import { charactersOf } from './characters';
 
 /** A polyline in pixels of a view, through its lens. */
 export interface Stroke {
@@ -13,7 +14,10 @@ export interface Stroke {
 
 export interface Label {
   readonly annotationId: string;
+  /** At most 40 characters of it. */
   readonly text: string;
+  /** All of it, for where there is room: the mark that is selected or pointed at. */
+  readonly whole: string;
   readonly at: Pixel;
   readonly colour: string;
   readonly hollow: boolean;
@@ -41,11 +45,11 @@ export const colourOf = ({ colorRgba }: Pick<Annotation, 'colorRgba'>): string =
   `#${(colorRgba >>> 8).toString(16).padStart(6, '0')}`;
 
 /** Undefined where the annotation has no place in this map. */
-export function markOf(annotation: Annotation): Mark | undefined {
+export function markOf(annotation: Annotation, scale: Scale): Mark | undefined {
   const { anchor, id, shape, text, sizeM, inkOffsetsM } = annotation;
   if (!anchor.pointInWorld || anchor.state === 'stopped') return undefined;
   const colour = colourOf(annotation);
-  const hollow = doNotTrust(anchor);
+  const hollow = doNotTrust(anchor, scale);
   return { id, shape, text, sizeM, inkOffsetsM, colour, hollow, pointInWorld: anchor.pointInWorld };
 }
 
@@ -105,21 +109,30 @@ export function strokesOf(view: View, marks: readonly Mark[]): Marks {
     }
     const at = projectPoint(view, mark.shape === 'note' ? noteTop(mark) : mark.pointInWorld);
     if (!at || !view.camera.inImage(at, -32)) continue;
-    const text = labelOf(mark);
-    if (text) {
-      labels.push({ annotationId: mark.id, text, at, colour: mark.colour, hollow: mark.hollow });
-    }
+    const text = labelOf(mark, shorten);
+    if (!text) continue;
+    const { id: annotationId, colour, hollow } = mark;
+    labels.push({ annotationId, text, whole: labelOf(mark, oneLine), at, colour, hollow });
   }
   return { strokes, labels };
 }
 
-function labelOf(mark: Mark): string {
-  const words = mark.shape === 'note' || mark.text ? shorten(mark.text || 'note') : '';
+function labelOf(mark: Mark, cut: (text: string) => string): string {
+  const words = mark.shape === 'note' || mark.text ? cut(mark.text || 'note') : '';
   if (!mark.hollow) return words;
   return mark.id === '' ? words : [words, 'do not trust'].filter(Boolean).join(': ');
 }
 
-const shorten = (text: string): string => (text.length > 40 ? `${text.slice(0, 39)}…` : text);
+const oneLine = (text: string): string => text.replace(/[\n\r\t]/g, ' ');
+
+const MAX_LABEL = 40; // characters
+
+/** Between characters as people count them: never within an emoji or an accented letter. */
+function shorten(text: string): string {
+  const characters = charactersOf(oneLine(text));
+  if (characters.length <= MAX_LABEL) return characters.join('');
+  return `${characters.slice(0, MAX_LABEL - 1).join('')}…`;
+}
 
 export interface AxisStroke {
   readonly name: 'x' | 'y' | 'z';

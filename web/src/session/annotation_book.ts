@@ -1,5 +1,5 @@
 import type { AnnotationEvent } from '../gen/saccade/v1/session_pb';
-import { toAnnotation } from './convert';
+import { toAnchor, toAnnotation } from './convert';
 import type { Annotation, PendingAnnotation } from './types';
 
 /** The server's annotations, with what this page has asked for and not heard back of. */
@@ -11,11 +11,16 @@ export class AnnotationBook {
   /** Rises with every change. */
   version = 0;
 
+  /** Of a state in parts only the first is `full`: the others add to it. */
   apply(event: AnnotationEvent): void {
     if (event.full) this.known.clear();
     for (const pb of event.upserted) {
       this.known.set(pb.id, toAnnotation(pb));
       this.gone.delete(pb.id);
+    }
+    for (const { id, anchor } of event.anchors) {
+      const known = this.known.get(id);
+      if (known) this.known.set(id, { ...known, anchor: toAnchor(anchor) });
     }
     for (const id of event.removedIds) {
       this.known.delete(id);

@@ -1,3 +1,6 @@
+import type { Clients } from '../transport/clients';
+import { sleep } from './sleep';
+
 interface Sample {
   readonly offsetMs: number;
   readonly roundTripMs: number;
@@ -57,3 +60,26 @@ export function wireTimes(
 
 /** This page's clock [ms], the same in its workers. */
 export const pageNowMs = (): number => performance.timeOrigin + performance.now();
+
+/** One measurement; without an answer none. */
+export async function ping(
+  session: Clients['session'],
+  clock: ClockOffset,
+  signal: AbortSignal,
+): Promise<void> {
+  const sent = pageNowMs();
+  try {
+    const reply = await session.ping(
+      { clientSendNs: BigInt(Math.round(sent * 1e6)) },
+      { signal, timeoutMs: 2000 },
+    );
+    const t1 = Number(reply.serverReceiveNs) / 1e6;
+    const t2 = Number(reply.serverSendNs) / 1e6;
+    const answered = pageNowMs();
+    await sleep(20, signal); // the browser records a request shortly after it has ended
+    const wire = wireTimes('/Ping', sent);
+    clock.add(wire?.sentMs ?? sent, t1, t2, wire?.answeredMs ?? answered);
+  } catch {
+    // The stream's silence says the same, and says it to the reader.
+  }
+}

@@ -1,6 +1,7 @@
 import {
   AnchorState as PbAnchorState,
   AnnotationShape,
+  type Anchor as PbAnchor,
   type Annotation as PbAnnotation,
 } from '../gen/saccade/v1/annotation_pb';
 import {
@@ -12,8 +13,13 @@ import {
 import {
   type Feature as PbFeature,
   FeatureState as PbFeatureState,
+  type FrameFeatures as PbFrameFeatures,
 } from '../gen/saccade/v1/map_pb';
-import { type Participant as PbParticipant, Role as PbRole } from '../gen/saccade/v1/session_pb';
+import {
+  type Participant as PbParticipant,
+  Role as PbRole,
+  type StatisticsEvent,
+} from '../gen/saccade/v1/session_pb';
 import {
   type PoseEvent,
   TrackingQuality as PbQuality,
@@ -25,16 +31,20 @@ import { covariance3 } from '../geometry/covariance';
 import { IDENTITY, type Rigid3 } from '../geometry/rigid3';
 import { type Vec3, ZERO } from '../geometry/vec3';
 import type {
+  Anchor,
   AnchorState,
   Annotation,
   Feature,
   FeatureState,
+  FrameFeatures,
   Participant,
   Pose,
   Quality,
   Role,
+  SeenFeature,
   Shape,
   Stages,
+  Statistics,
   TrackingStatus,
 } from './types';
 
@@ -163,8 +173,31 @@ export function toFeature(pb: PbFeature): Feature {
   };
 }
 
+/** Sixteenths of a pixel of the raw picture. */
+export function toFrameFeatures(pb: PbFrameFeatures): FrameFeatures {
+  const seen = new Map<number, SeenFeature>();
+  const take = (state: SeenFeature['state'], ids: bigint[], px16: number[]): void => {
+    ids.forEach((id, i) => {
+      const [u, v] = [px16[2 * i], px16[2 * i + 1]];
+      if (u === undefined || v === undefined) return;
+      seen.set(Number(id), { state, pixel: { u: u / 16, v: v / 16 } });
+    });
+  };
+  take('failed', pb.failedIds, pb.failedPx16);
+  take('measured', pb.measuredIds, pb.measuredPx16);
+  return seen;
+}
+
+export const toAnchor = (pb: PbAnchor | undefined): Anchor => ({
+  state: anchorStates[pb?.state ?? PbAnchorState.UNSPECIFIED],
+  pointInWorld: pb?.pointInWorldM && toVec3(pb.pointInWorldM),
+  covariance: covariance3(pb?.covarianceInWorldM2?.upper ?? []),
+  errorMm: pb?.errorMm ?? 0,
+  errorPx: pb?.errorPx,
+  reason: pb?.reason ?? '',
+});
+
 export function toAnnotation(pb: PbAnnotation): Annotation {
-  const anchor = pb.anchor;
   return {
     id: pb.id,
     shape: shapes[pb.shape],
@@ -174,14 +207,7 @@ export function toAnnotation(pb: PbAnnotation): Annotation {
     colorRgba: pb.colorRgba || 0xffffffff,
     createdMs: Number(pb.createdUnixNs) / 1e6,
     inkOffsetsM: pb.inkOffsetM.map(toVec3),
-    anchor: {
-      state: anchorStates[anchor?.state ?? PbAnchorState.UNSPECIFIED],
-      pointInWorld: anchor?.pointInWorldM && toVec3(anchor.pointInWorldM),
-      covariance: covariance3(anchor?.covarianceInWorldM2?.upper ?? []),
-      errorMm: anchor?.errorMm ?? 0,
-      errorPx: anchor?.errorPx,
-      reason: anchor?.reason ?? '',
-    },
+    anchor: toAnchor(pb.anchor),
   };
 }
 
@@ -189,4 +215,14 @@ export const toParticipant = (pb: PbParticipant): Participant => ({
   participantId: pb.participantId,
   name: pb.displayName,
   role: roles[pb.role],
+});
+
+export const toStatistics = (pb: StatisticsEvent): Statistics => ({
+  capturedFps: pb.capturedFpsHz,
+  trackedFps: pb.trackedFpsHz,
+  encodedFps: pb.encodedFpsHz,
+  framesDropped: Number(pb.framesDropped),
+  badFrames: Number(pb.badFrames),
+  eventsSkipped: Number(pb.eventsSkipped),
+  videoBitRate: pb.videoBitRateBitS,
 });

@@ -2,7 +2,7 @@ import { create, type MessageInitShape } from '@bufbuild/protobuf';
 import { AnnotationDraftSchema, AnnotationTargetSchema } from '../gen/saccade/v1/annotation_pb';
 import { PixelSchema, Vector3Schema } from '../gen/saccade/v1/geometry_pb';
 import type { Vec3 } from '../geometry/vec3';
-import { describeError, isGone } from '../transport/errors';
+import { isGone, plainWords } from '../transport/errors';
 import { pbShapes, toAnnotation } from './convert';
 import type { Session } from './session';
 import type { Annotation, Shape, Target } from './types';
@@ -119,7 +119,7 @@ export class Edits {
 }
 
 const asEditError = (error: unknown): EditError =>
-  error instanceof EditError ? error : new EditError(describeError(error));
+  error instanceof EditError ? error : new EditError(plainWords(error));
 
 function toTarget(target: Target): MessageInitShape<typeof AnnotationTargetSchema> {
   const vector = (v: Vec3) => create(Vector3Schema, { x: v.x, y: v.y, z: v.z });
@@ -152,7 +152,7 @@ function toTarget(target: Target): MessageInitShape<typeof AnnotationTargetSchem
 }
 
 /** RFC 4122, version 4. `crypto.randomUUID` exists only on localhost and https. */
-function newUuid(): string {
+export function newUuid(): string {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   bytes[6] = ((bytes[6] ?? 0) & 0x0f) | 0x40;
   bytes[8] = ((bytes[8] ?? 0) & 0x3f) | 0x80;

@@ -52,6 +52,13 @@ export interface Gaze {
   readonly timeNs: bigint;
 }
 
+/** The server's words about a change of hands, for the one whom they call vanished, but who is there. */
+export function ownHandover(words: string, myName: string): string {
+  const vanished = `${myName} vanished; `;
+  if (!words.startsWith(vanished)) return words;
+  return `this page was not heard in time; ${words.slice(vanished.length)}`;
+}
+
 /** True where there is something to turn: a motorised head, or a crop of the picture. */
 export const hasHead = (gaze: Gaze | undefined): gaze is Gaze =>
   gaze !== undefined && gaze.mode !== 'no_mount';

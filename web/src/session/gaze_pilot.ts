@@ -2,7 +2,7 @@ import type { GazeState } from '../gen/saccade/v1/gaze_pb';
 import { plainWords } from '../transport/errors';
 import type { LeaseKeeper, LeaseKeeping } from '../transport/lease_keeper';
 import type { LeaseTold } from '../transport/lease_loop';
-import type { GazeTarget } from './gaze';
+import { type GazeTarget, ownHandover } from './gaze';
 import { fromTarget, toGaze } from './gaze_convert';
 import type { Session } from './session';
 
@@ -199,8 +199,7 @@ export class GazePilot {
       this.lost = '';
       await this.begin(); // in vain: then the reason is the one that ended it
     } else if (state?.lastHandover) {
-      const late = !state.pilot && / vanished; nobody pilots$/.test(state.lastHandover);
-      const why = late ? 'this page was not heard in time' : state.lastHandover;
+      const why = ownHandover(state.lastHandover, this.session.displayName);
       this.lost = `You pilot no longer: ${why}.`;
     }
     ++this.version;

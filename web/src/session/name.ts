@@ -1,4 +1,4 @@
-const MAX_BYTES = 60; // session.proto
+export const MAX_NAME_BYTES = 60; // session.proto
 const KEY = 'saccade.name';
 
 /** As the server takes it: one line, at most 60 bytes of UTF-8, cut between characters. */
@@ -9,7 +9,7 @@ export function cleanName(text: string): string {
   let bytes = 0;
   for (const character of line) {
     bytes += encoder.encode(character).length;
-    if (bytes > MAX_BYTES) break;
+    if (bytes > MAX_NAME_BYTES) break;
     name += character;
   }
   return name.trim();

@@ -1,18 +1,23 @@
 import type { AccessUnit } from '../gen/saccade/v1/video_pb';
 import { VideoView } from '../gen/saccade/v1/video_pb';
 import type { Event, JoinResponse } from '../gen/saccade/v1/session_pb';
-import { Camera } from '../geometry/camera';
 import type { Clients } from '../transport/clients';
 import { Backoff } from '../transport/backoff';
-import { describeError, isRefusal } from '../transport/errors';
+import { isRefusal, isReplaced, streamEndWords } from '../transport/errors';
 import { Acknowledger } from './acknowledger';
 import { AnnotationBook } from './annotation_book';
-import { ClockOffset, pageNowMs, wireTimes } from './clock';
-import { pbRoles, toIntrinsics, toParticipant, toPose, toStages } from './convert';
+import { ClockOffset, pageNowMs, ping } from './clock';
+import { toParticipant, toPose, toStatistics } from './convert';
+import { FrameReader } from './frame_reader';
 import type { Gaze } from './gaze';
 import { toGaze } from './gaze_convert';
+import { Joining } from './joining';
+import type { KeptSession } from './kept_session';
 import { MapState } from './map_state';
 import { FrameRing } from './ring';
+import { silenceWords } from './silence';
+import { sleep } from './sleep';
+import type { Tabs } from './tabs';
 import {
   type FrameFacts,
   isPlaced,
@@ -20,6 +25,7 @@ import {
   type Participant,
   type Pose,
   type Role,
+  type Scale,
 } from './types';
 import type { Statistics, View } from './types';
 
@@ -36,6 +42,10 @@ export interface SessionOptions {
   readonly role: Role;
   readonly view: View;
   readonly name: string;
+  /** Where the session is kept for a reload; without it, only while the page lives. */
+  readonly kept?: KeptSession;
+  /** The other tabs of this browser, where they can be asked. */
+  readonly tabs?: Tabs;
 }
 
 const WINDOW = 32;
@@ -59,20 +69,28 @@ export class Session {
   readonly frames = new FrameRing<FrameFacts>(300);
   readonly path: Pose[] = [];
   readonly clock = new ClockOffset();
-  private camera: Camera | undefined;
+  private readonly reader = new FrameReader();
+  private heardMs = 0; // when the stream last told something; 0: not yet
   private lastEventMs = 0;
   private acknowledger: Acknowledger | undefined;
   private readonly backoff = new Backoff();
   private attempt: AbortController | undefined;
-  private name: string;
   private renamed = false;
+  private readonly joining: Joining;
+  private ended = ''; // why we ended the attempt ourselves
+  private watchedMs = 0;
 
   constructor(
     readonly clients: Clients,
     private readonly options: SessionOptions,
     private readonly pictures: PictureSink,
   ) {
-    this.name = options.name;
+    this.joining = new Joining(clients.session, options);
+  }
+
+  /** What others call this page. */
+  get displayName(): string {
+    return this.joining.name;
   }
 
   /** What others know this page by: as pilot, and in presence. */
@@ -84,6 +102,16 @@ export class Session {
     return this.joined?.sessionId ?? '';
   }
 
+  get scale(): Scale {
+    const { pose } = this;
+    return { metric: pose?.metric ?? false, eye: pose?.worldFromCamera.translation };
+  }
+
+  /** How old everything shown is [ms]; undefined while it is live, and before the first of it. */
+  get ageMs(): number | undefined {
+    return this.live || this.heardMs === 0 ? undefined : pageNowMs() - this.heardMs;
+  }
+
   /** True when requests can be expected to be answered. */
   get live(): boolean {
     return this.link.kind === 'live';
@@ -91,8 +119,8 @@ export class Session {
 
   /** The name the others see, from now on: joins anew, as a name belongs to a session. */
   rename(name: string): void {
-    if (name === this.name) return;
-    this.name = name;
+    if (name === this.joining.name) return;
+    this.joining.rename(name);
     this.renamed = true;
     this.attempt?.abort();
   }
@@ -108,6 +136,11 @@ export class Session {
     this.acknowledger?.requestKeyFrame();
   }
 
+  /** The decoder has done a picture: what was held back may go on. */
+  decoded(): void {
+    this.acknowledger?.flush(WINDOW / 4);
+  }
+
   /** Runs until `signal` says stop. */
   async run(signal: AbortSignal): Promise<void> {
     while (!signal.aborted) {
@@ -121,11 +154,13 @@ export class Session {
         this.lost('the server ended the stream');
       } catch (error) {
         if (isRefusal(error)) {
-          this.link = { kind: 'refused', reason: describeError(error) };
+          this.link = { kind: 'refused', reason: streamEndWords(error) };
           return;
         }
-        const reason = attempt.signal.aborted ? 'no data for 4 s' : describeError(error);
-        this.lost(reason);
+        const ours = attempt.signal.aborted;
+        // Another tab goes on with this session: leave it to that one, or both would never end it.
+        if (!ours && isReplaced(error)) this.joining.forget();
+        this.lost(ours ? this.ended : streamEndWords(error));
       } finally {
         attempt.abort();
         signal.removeEventListener('abort', stop);
@@ -149,11 +184,12 @@ export class Session {
 
   private async runOnce(attempt: AbortController): Promise<void> {
     const { signal } = attempt;
-    const { role, view } = this.options;
-    const joined = await this.clients.session.join(
-      { displayName: this.name, role: pbRoles[role] },
-      { signal, timeoutMs: 5000 },
+    const { view } = this.options;
+    const joined = await this.joining.join(
+      signal,
+      (tabs) => (this.link = { kind: 'crowded', tabs }),
     );
+    if (signal.aborted) return;
     this.begin(joined, signal);
     const timers = [
       setInterval(() => this.watch(attempt), 500),
@@ -178,7 +214,7 @@ export class Session {
 
   private begin(joined: JoinResponse, signal: AbortSignal): void {
     this.joined = joined;
-    this.lastEventMs = pageNowMs();
+    this.lastEventMs = this.watchedMs = pageNowMs();
     this.sourceEnded = false;
     this.gaze = undefined;
     this.frames.clear();
@@ -199,29 +235,21 @@ export class Session {
 
   /** A stream that is silent without having ended: the machine or the network went away. */
   private watch(attempt: AbortController): void {
-    if (pageNowMs() - this.lastEventMs > SILENCE_MS) attempt.abort();
+    const nowMs = pageNowMs();
+    const [silentMs, asleepMs] = [nowMs - this.lastEventMs, nowMs - this.watchedMs];
+    this.watchedMs = nowMs;
+    if (silentMs > SILENCE_MS) this.ended = silenceWords(silentMs, asleepMs);
+    else if (this.options.tabs?.mayStream === false) this.ended = 'older tabs go first';
+    else return;
+    attempt.abort();
   }
 
-  private async ping(signal: AbortSignal): Promise<void> {
-    const sent = pageNowMs();
-    try {
-      const reply = await this.clients.session.ping(
-        { clientSendNs: BigInt(Math.round(sent * 1e6)) },
-        { signal, timeoutMs: 2000 },
-      );
-      const t1 = Number(reply.serverReceiveNs) / 1e6;
-      const t2 = Number(reply.serverSendNs) / 1e6;
-      const answered = pageNowMs();
-      await sleep(20, signal); // the browser records a request shortly after it has ended
-      const wire = wireTimes('/Ping', sent);
-      this.clock.add(wire?.sentMs ?? sent, t1, t2, wire?.answeredMs ?? answered);
-    } catch {
-      // The stream's silence says the same, and says it to the reader.
-    }
+  private ping(signal: AbortSignal): Promise<void> {
+    return ping(this.clients.session, this.clock, signal);
   }
 
   private receive({ sequence, event }: Event): void {
-    this.lastEventMs = pageNowMs();
+    this.heardMs = this.lastEventMs = pageNowMs();
     this.link = { kind: 'live' };
     this.backoff.reset();
     switch (event.case) {
@@ -241,15 +269,7 @@ export class Session {
         this.participants = event.value.participants.map(toParticipant);
         break;
       case 'statistics':
-        this.statistics = {
-          capturedFps: event.value.capturedFpsHz,
-          trackedFps: event.value.trackedFpsHz,
-          encodedFps: event.value.encodedFpsHz,
-          framesDropped: Number(event.value.framesDropped),
-          badFrames: Number(event.value.badFrames),
-          eventsSkipped: Number(event.value.eventsSkipped),
-          videoBitRate: event.value.videoBitRateBitS,
-        };
+        this.statistics = toStatistics(event.value);
         break;
       case 'endOfSource':
         this.sourceEnded = true;
@@ -264,20 +284,8 @@ export class Session {
   }
 
   private receivePicture(unit: AccessUnit): void {
-    const pb = unit.intrinsics ?? this.joined?.intrinsics;
-    if (!pb) return;
-    const intrinsics = toIntrinsics(pb);
-    if (!this.camera || JSON.stringify(this.camera.intrinsics) !== JSON.stringify(intrinsics)) {
-      this.camera = new Camera(intrinsics);
-    }
-    const facts: FrameFacts = {
-      frameId: Number(unit.frameId),
-      view: unit.view === VideoView.AUGMENTED ? 'augmented' : 'raw',
-      pose: unit.pose && toPose(unit.pose),
-      camera: this.camera,
-      stages: toStages(unit.stages),
-      arrivedMs: this.lastEventMs,
-    };
+    const facts = this.reader.read(unit, this.joined?.intrinsics, this.lastEventMs);
+    if (!facts) return;
     this.frames.set(facts.frameId, facts);
     this.pictures.decode(facts, unit);
   }
@@ -289,14 +297,4 @@ export class Session {
     this.path.push(pose);
     if (this.path.length > 9000) this.path.splice(0, 3000);
   }
-}
-
-function sleep(ms: number, signal: AbortSignal): Promise<void> {
-  return new Promise((resolve) => {
-    const timer = setTimeout(resolve, ms);
-    signal.addEventListener('abort', () => {
-      clearTimeout(timer);
-      resolve();
-    });
-  });
 }

@@ -1,7 +1,7 @@
 import type { Camera } from '../geometry/camera';
 import type { Covariance3 } from '../geometry/covariance';
 import type { Rigid3 } from '../geometry/rigid3';
-import type { Pixel, Vec3 } from '../geometry/vec3';
+import { distance, type Pixel, type Vec3 } from '../geometry/vec3';
 
 export type TrackingStatus =
   | 'unknown'
@@ -43,12 +43,23 @@ export interface Stages {
   readonly queued: number;
 }
 
+/** A feature as one frame saw it: where it measured it, or where it expected it and found nothing. */
+export interface SeenFeature {
+  readonly state: 'measured' | 'failed';
+  readonly pixel: Pixel;
+}
+
+/** By feature id, of that very frame; what is not in it was not searched for. */
+export type FrameFeatures = ReadonlyMap<number, SeenFeature>;
+
 /** What is known of a frame before its picture is decoded: everything but the picture. */
 export interface FrameFacts {
   readonly frameId: number;
   readonly view: View;
   readonly pose: Pose | undefined;
   readonly camera: Camera;
+  /** Undefined: the server did not say. */
+  readonly features?: FrameFeatures | undefined;
   readonly stages: Stages;
   readonly arrivedMs: number; // this page's clock, performance.timeOrigin + now()
 }
@@ -100,6 +111,7 @@ export interface Participant {
   readonly role: Role;
 }
 
+/** The server's, over the last seconds. */
 export interface Statistics {
   readonly capturedFps: number;
   readonly trackedFps: number;
@@ -118,10 +130,50 @@ export type Target =
 
 export type Link =
   | { readonly kind: 'connecting' }
+  /** As many tabs of this browser are connected as it has connections for. */
+  | { readonly kind: 'crowded'; readonly tabs: number }
   | { readonly kind: 'live' }
   | { readonly kind: 'reconnecting'; readonly reason: string; readonly sinceMs: number }
   | { readonly kind: 'refused'; readonly reason: string };
 
-/** An anchor whose place is not to be relied upon (drawn hollow and named so). */
-export const doNotTrust = (anchor: Anchor): boolean =>
-  anchor.state === 'paused' || anchor.state === 'stopped';
+/** What lengths mean now. */
+export interface Scale {
+  readonly metric: boolean; // world is in metres; false where that is not known
+  readonly eye: Vec3 | undefined; // the wearer's camera
+}
+
+/** Above these a mark is not to be trusted: as the server has them by default. */
+const LIMIT_MM = 50;
+const LIMIT_OF_DISTANCE = 0.02; // where that is more
+const LIMIT_PX = 10;
+
+export interface Excess {
+  readonly mm: boolean;
+  readonly px: boolean;
+}
+
+/** Which of its expected errors is above its limit; without scale there are no millimetres. */
+export function excessOf(anchor: Anchor, { metric, eye }: Scale): Excess {
+  const { pointInWorld, errorMm, errorPx } = anchor;
+  const away = eye && pointInWorld ? distance(eye, pointInWorld) : 0;
+  const limitMm = Math.max(LIMIT_MM, 1000 * LIMIT_OF_DISTANCE * away);
+  return { mm: metric && errorMm > limitMm, px: (errorPx ?? 0) > LIMIT_PX };
+}
+
+/**
+ * An anchor whose place is not to be relied upon (drawn hollow and named so): as the server judges it,
+ * and while it is provisional and not judged yet, by its expected error.
+ */
+export function doNotTrust(anchor: Anchor, scale: Scale): boolean {
+  switch (anchor.state) {
+    case 'paused':
+    case 'stopped':
+      return true;
+    case 'provisional': {
+      const { mm, px } = excessOf(anchor, scale);
+      return mm || px;
+    }
+    case 'tracking':
+      return false;
+  }
+}

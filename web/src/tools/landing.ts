@@ -39,7 +39,10 @@ export function landingInVideo(
   return guess && { ...guess, target: { kind: 'pixel', frameId, pixel } };
 }
 
-/** A click on the map: a feature where one is close enough, else the ray into the scene. */
+/**
+ * A click on the map: a feature where one is close enough, else the ray into the scene. Nothing where
+ * only the depth of other places could be guessed: in an empty corner nothing is to be seen.
+ */
 export function landingInMap(
   view: View,
   pixel: Pixel,
@@ -49,7 +52,8 @@ export function landingInMap(
   const ray = rayThrough(view, pixel);
   const guess = guessAt(view, pixel, seen);
   const nearest = seen[0];
-  if (!guess || !ray || !nearest) return undefined; // nothing mapped there
+  if (!guess || !ray || !nearest) return undefined;
+  if (guess.how !== 'feature' && guess.how !== 'plane') return undefined;
   if (nearest.away <= SNAP_PX) {
     const { id, pointInWorld } = nearest.feature;
     return { ...guess, pointInWorld, target: { kind: 'feature', featureId: id } };
@@ -148,11 +152,12 @@ export function ringRadius(view: View, landing: Landing): number | undefined {
   return (landing.sigmaM / landing.depthM) * ((fx + fy) / 2);
 }
 
-/** In words, for beside the ring. */
-export function landingWords(landing: Landing): string {
+/** In words, for beside the ring; without scale in pixels, as there are no metres. */
+export function landingWords(view: View, landing: Landing, metric: boolean): string {
   const { sigmaM, how } = landing;
   if (sigmaM === undefined) return 'depth unknown';
-  const size =
+  const length =
     sigmaM < 0.0095 ? `${(sigmaM * 1000).toFixed(0)} mm` : `${(sigmaM * 100).toFixed(0)} cm`;
+  const size = metric ? length : `${(ringRadius(view, landing) ?? 0).toFixed(0)} px`;
   return how === 'nearby depth' ? `±${size}, depth guessed` : `±${size}`;
 }

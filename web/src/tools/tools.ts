@@ -24,7 +24,13 @@ export interface Control<Name extends string> {
 /** What a click in the video or the map does. One key each. */
 export const TOOLS: readonly Control<ToolName>[] = [
   { name: 'select', label: 'Select', key: 'v', shown: 'V', hint: 'click a mark to select it' },
-  { name: 'cube', label: 'Cube', key: 'c', shown: 'C', hint: 'click to place a 5 cm cube' },
+  {
+    name: 'cube',
+    label: 'Cube',
+    key: 'c',
+    shown: 'C',
+    hint: 'click to place a cube, 5 cm where the scale is known',
+  },
   { name: 'note', label: 'Note', key: 'n', shown: 'N', hint: 'click to place a note, then type' },
   { name: 'arrow', label: 'Arrow', key: 'a', shown: 'A', hint: 'click to place an arrow' },
   {

@@ -5,7 +5,7 @@ import type { AppState } from './app_state';
 import { h, icon, setClass, setText } from './dom';
 import { ICONS } from './icons';
 import { Palette } from './palette';
-import { anchorWords } from './words';
+import { anchorWords, dated, shapeWord } from './words';
 
 export interface AnnotationActions {
   select(id: string): void;
@@ -16,8 +16,6 @@ export interface AnnotationActions {
   lookAt(id: string): void;
   /** The colour of new marks, and of the selected one: 0xRRGGBBAA. */
   paint(colorRgba: number): void;
-  /** Empty `text` keeps the note as it is. */
-  finishEditing(id: string, text: string | undefined): void;
   startEditing(id: string): void;
 }
 
@@ -27,7 +25,6 @@ interface Row {
   readonly state: HTMLElement;
   readonly by: HTMLElement;
   readonly button: HTMLElement;
-  editor: HTMLFormElement | undefined;
 }
 
 /** Every annotation with its state and live error. */
@@ -47,6 +44,7 @@ export class AnnotationsPanel {
     private readonly session: Session,
     private readonly state: AppState,
     private readonly actions: AnnotationActions,
+    editor: HTMLElement,
   ) {
     this.palette = new Palette((colour) => actions.paint(colour));
     this.element = h(
@@ -54,6 +52,7 @@ export class AnnotationsPanel {
       { 'aria-label': 'Annotations' },
       h('h2', {}, 'Annotations', this.count),
       this.palette.element,
+      editor,
       this.empty,
       this.list,
     );
@@ -76,81 +75,53 @@ export class AnnotationsPanel {
   private updateRow(annotation: Annotation): void {
     const row = this.rows.get(annotation.id) ?? this.addRow(annotation);
     const selected = annotation.id === this.state.selectedId;
-    const words = anchorWords(annotation, this.session.pose?.metric ?? true);
+    const { text, warn } = anchorWords(annotation, this.session.scale);
+    const words = { text: dated(text, this.session.ageMs), warn };
     const refusal = this.state.refusal(`annotation ${annotation.id}`);
-    setText(row.title, annotation.text || annotation.shape);
+    setText(row.title, annotation.text || shapeWord(annotation.shape));
     setText(row.state, refusal ?? words.text);
     const provisional = annotation.anchor.state === 'provisional';
     setText(row.by, provisional ? 'provisional' : annotation.author);
     setClass(row.element, 'warn', words.warn || refusal !== undefined);
-    if (selected && !row.element.classList.contains('selected')) {
-      row.element.scrollIntoView({ block: 'nearest' });
-    }
+    const chosen = selected && !row.element.classList.contains('selected');
     setClass(row.element, 'selected', selected);
+    if (chosen) row.element.scrollIntoView({ block: 'nearest' });
     row.element.style.setProperty('--mark', colourOf(annotation));
     row.button.setAttribute('aria-pressed', String(selected));
-    this.updateEditor(row, annotation);
+    row.button.title = titleOf(annotation, words.text);
   }
 
   private addRow(annotation: Annotation): Row {
-    const { id, shape, author } = annotation;
-    const title = h('span', { class: 'title' });
+    const { id, shape } = annotation;
+    const title = h('span', { class: 'title', dir: 'auto' });
     const state = h('span', { class: 'state number' });
     const by = h('span', { class: 'by' });
     const button = h(
       'button',
-      { class: 'pick', type: 'button', title: `${shape} by ${author}` },
+      { class: 'pick', type: 'button' },
       icon(ICONS[shape === 'ink' ? 'arrow' : shape]),
       h('span', { class: 'words' }, title, by, state),
     );
     button.addEventListener('click', () => this.actions.select(id));
     button.addEventListener('dblclick', () => this.actions.startEditing(id));
     const remove = h('button', { class: 'remove', type: 'button', title: 'Delete (Del)' });
-    remove.setAttribute('aria-label', `Delete ${shape}`);
+    remove.setAttribute('aria-label', `Delete ${shapeWord(shape)}`);
     remove.append(icon('M5.5 5.5l9 9M14.5 5.5l-9 9'));
     remove.addEventListener('click', () => this.actions.remove(id));
     const look = h('button', { class: 'look', type: 'button', title: 'Turn the camera to it' });
-    look.setAttribute('aria-label', `Turn the camera to this ${shape}`);
+    look.setAttribute('aria-label', `Turn the camera to this ${shapeWord(shape)}`);
     look.append(icon(ICONS.gaze));
     look.addEventListener('click', () => this.actions.lookAt(id));
     const element = h('li', { 'data-id': id, 'data-shape': shape }, button, look, remove);
     element.addEventListener('pointerenter', () => this.actions.point(id));
     element.addEventListener('pointerleave', () => this.actions.point(undefined));
     this.list.append(element);
-    const row: Row = { element, title, state, by, button, editor: undefined };
+    const row: Row = { element, title, state, by, button };
     this.rows.set(id, row);
     return row;
   }
-
-  private updateEditor(row: Row, annotation: Annotation): void {
-    const wanted = this.state.editingId === annotation.id;
-    if (wanted === (row.editor !== undefined)) return;
-    if (!wanted) {
-      row.editor?.remove();
-      row.editor = undefined;
-      return;
-    }
-    const input = h('input', {
-      type: 'text',
-      maxlength: '160',
-      placeholder: 'what it says; Enter to keep',
-      'aria-label': 'Text of the note',
-    });
-    input.value = annotation.text;
-    const editor = h('form', { class: 'editor' }, input);
-    editor.addEventListener('submit', (event) => {
-      event.preventDefault();
-      this.actions.finishEditing(annotation.id, input.value.trim());
-    });
-    input.addEventListener('keydown', (event) => {
-      event.stopPropagation(); // letters are text here, not tools
-      if (event.key === 'Escape') this.actions.finishEditing(annotation.id, undefined);
-    });
-    input.addEventListener('blur', () => {
-      if (row.editor) this.actions.finishEditing(annotation.id, input.value.trim());
-    });
-    row.editor = editor;
-    row.element.append(editor);
-    input.focus();
-  }
 }
+
+/** All of it, whatever the row has room for. */
+const titleOf = ({ shape, author, text }: Annotation, state: string): string =>
+  [text, `${shapeWord(shape)} by ${author}`, state].filter(Boolean).join('\n');

@@ -15,6 +15,7 @@ import { Header } from './header';
 import { Help } from './help';
 import { handleKeys } from './keys';
 import { MapPane } from './map_pane';
+import { Notes } from './notes';
 import type { Player } from './player';
 import { handleMapPointer, handleVideoPointer } from './pointer';
 import { Strip } from './strip';
@@ -55,9 +56,10 @@ export class App {
     this.pilot = new GazePilot(session, new WorkerKeeping(location.origin));
     const gaze = new GazeController(session, this.pilot, state);
     const edits = new Edits(session);
-    const controller = new Controller(session, edits, state, this.map, this.video, gaze);
+    const notes = new Notes(session, edits, state);
+    const controller = new Controller(session, edits, state, this.map, this.video, gaze, notes);
     this.tools = new ToolsColumn(controller);
-    this.annotations = new AnnotationsPanel(session, state, controller);
+    this.annotations = new AnnotationsPanel(session, state, controller, notes.editor.element);
     this.gaze = new GazePanel(session, this.pilot, state, gaze);
     this.notice = new HandoverNotice(session);
     this.stage.append(this.map.element, this.video.element, this.notice.element);
@@ -70,6 +72,7 @@ export class App {
       this.strip.element,
       this.help.dialog,
     );
+    notes.listen();
     handleMapPointer(this.map, controller.mapGestures());
     handleVideoPointer(this.video.element, controller.videoGestures());
     handleKeys(controller, gaze, this.map, this.video, this.help);

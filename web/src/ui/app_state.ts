@@ -18,7 +18,6 @@ export class AppState {
   tool: ToolName = 'select';
   selectedId: string | undefined;
   pointedId: string | undefined; // the one whose row is pointed at
-  editingId: string | undefined; // a note whose text is being typed
   hover: Hover | undefined;
   main: PaneName = 'map';
   confirmingReset = false;

@@ -2,7 +2,7 @@ import type { Pixel } from '../geometry/vec3';
 import type { View } from '../geometry/view';
 import { EditError, type Edits } from '../session/edits';
 import type { Session } from '../session/session';
-import { type Annotation, type FrameFacts, isPlaced } from '../session/types';
+import { type Annotation, isPlaced } from '../session/types';
 import { type Landing, landingInMap, landingInVideo, rayThrough } from '../tools/landing';
 import { pickNearest } from '../tools/pick';
 import { type CommandName, shapeOf, type ToolName } from '../tools/tools';
@@ -10,6 +10,7 @@ import type { AnnotationActions } from './annotations_panel';
 import type { AppState, PaneName, Place } from './app_state';
 import type { GazeController } from './gaze_controller';
 import type { MapPane } from './map_pane';
+import type { Notes } from './notes';
 import type { MapGestures } from './pointer';
 import type { ToolActions } from './tools_column';
 import type { VideoPane } from './video_pane';
@@ -28,6 +29,7 @@ export class Controller implements ToolActions, AnnotationActions {
     private readonly map: MapPane,
     private readonly video: VideoPane,
     private readonly gaze: GazeController,
+    private readonly notes: Notes,
   ) {}
 
   choose(tool: ToolName): void {
@@ -104,18 +106,7 @@ export class Controller implements ToolActions, AnnotationActions {
   }
 
   startEditing(id: string): void {
-    if (this.session.annotations.get(id)?.shape !== 'note') return;
-    this.state.editingId = id;
-    this.state.changed();
-  }
-
-  finishEditing(id: string, text: string | undefined): void {
-    if (this.state.editingId !== id) return;
-    this.state.editingId = undefined;
-    this.state.changed();
-    const before = this.session.annotations.get(id)?.text;
-    if (!text || text === before) return;
-    this.attempt(`annotation ${id}`, () => this.edits.setText(id, text));
+    this.notes.edit(id);
   }
 
   mapGestures(): MapGestures {
@@ -129,8 +120,7 @@ export class Controller implements ToolActions, AnnotationActions {
       click: (x, y) => {
         const view = this.map.view();
         const pixel = this.map.pixelAt(x, y);
-        if (!view) return;
-        this.act('map', this.landing('map', pixel), this.pick(view, pixel, PICK_PX));
+        this.act('map', this.landing('map', pixel), view && this.pick(view, pixel, PICK_PX));
       },
     };
   }
@@ -155,7 +145,7 @@ export class Controller implements ToolActions, AnnotationActions {
       click: () => {
         const { pressed } = this;
         this.pressed = undefined;
-        if (pressed) this.act('video', pressed.landing, pressed.picked);
+        this.act('video', pressed?.landing, pressed?.picked);
       },
     };
   }
@@ -176,13 +166,24 @@ export class Controller implements ToolActions, AnnotationActions {
 
   private hover(pane: PaneName, pixel: Pixel | undefined): void {
     const { state } = this;
-    const placing = state.tool !== 'select';
-    state.hover =
-      placing && pixel ? { pane, pixel, landing: this.landing(pane, pixel) } : undefined;
-    if (placing) state.changed();
+    if (state.tool === 'select') {
+      state.hover = undefined;
+      return this.pointAt(pane, pixel);
+    }
+    state.hover = pixel && { pane, pixel, landing: this.landing(pane, pixel) };
+    state.changed();
+  }
+
+  /** The mark under the pointer shows all that it says. */
+  private pointAt(pane: PaneName, pixel: Pixel | undefined): void {
+    const view = pane === 'map' ? this.map.view() : this.video.current()?.view;
+    const radius = pane === 'map' ? PICK_PX : PICK_PX / this.video.scale;
+    const id = view && pixel && this.pick(view, pixel, radius)?.id;
+    if (id !== this.state.pointedId) this.point(id);
   }
 
   private leave(pane: PaneName): void {
+    if (this.state.tool === 'select' && this.state.pointedId) this.point(undefined);
     if (this.state.hover?.pane !== pane) return;
     this.state.hover = undefined;
     this.state.changed();
@@ -197,13 +198,10 @@ export class Controller implements ToolActions, AnnotationActions {
     const current = this.video.current();
     if (!current?.view) return undefined;
     const landing = landingInVideo(current.view, current.facts.frameId, pixel, features);
-    if (!landing || !this.video.frozen || !this.sameMap(current.facts)) return landing;
+    // A frozen picture is clicked late, a note is placed when its text is done.
+    const late = this.video.frozen || this.state.tool === 'note';
+    if (!landing || !late || !this.video.sameMap) return landing;
     return { ...landing, later: rayThrough(current.view, pixel) };
-  }
-
-  /** False if the map has jumped since that frame: its pose says nothing about today's map. */
-  private sameMap({ pose }: FrameFacts): boolean {
-    return pose?.mapRevision === this.session.pose?.mapRevision;
   }
 
   private pick(view: View, pixel: Pixel, radius: number): Annotation | undefined {
@@ -213,12 +211,14 @@ export class Controller implements ToolActions, AnnotationActions {
 
   private act(pane: PaneName, landing: Landing | undefined, picked: Annotation | undefined): void {
     const { state } = this;
+    if (this.notes.takeClick()) return;
     if (state.tool === 'gaze') return this.look(pane, landing, picked);
     const shape = shapeOf(state.tool);
     if (!shape) {
       state.selectedId = picked?.id;
       return state.changed();
     }
+    if (shape === 'note') return this.notes.click(landing, this.whyNoLanding(pane));
     if (!this.session.live) return state.refuse(pane, 'Not placed: no connection to the server.');
     if (!landing) return state.refuse(pane, `Not placed: ${this.whyNoLanding(pane)}`);
     this.attempt(pane, async () => {
@@ -231,17 +231,18 @@ export class Controller implements ToolActions, AnnotationActions {
         guessInWorld: landing.pointInWorld,
       });
       state.selectedId = placed.id;
-      if (shape === 'note') state.editingId = placed.id;
       state.changed();
     });
   }
 
   private whyNoLanding(pane: PaneName): string {
-    const pose = pane === 'video' ? this.video.current()?.facts.pose : this.session.pose;
-    if (!isPlaced(pose)) {
-      return 'where the camera is is not known now.';
+    if (pane === 'map') {
+      return this.map.view() ? 'nothing is mapped there.' : 'the map is not shown yet.';
     }
-    return pane === 'map' ? 'nothing is mapped there.' : 'outside the lens.';
+    const current = this.video.current();
+    if (!current) return 'there is no picture yet.';
+    const placed = isPlaced(current.facts.pose);
+    return placed ? 'that is outside the picture.' : 'where the camera is is not known now.';
   }
 
   /** Turns the camera there; a mark there is followed, if it is moved. */

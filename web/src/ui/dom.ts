@@ -42,3 +42,34 @@ export function storage(): Pick<Storage, 'getItem' | 'setItem'> {
     return { getItem: () => null, setItem: () => undefined };
   }
 }
+
+/** What this tab keeps over a reload; where a person forbids that, nothing. */
+export function tabStorage(): Pick<Storage, 'getItem' | 'setItem' | 'removeItem'> {
+  try {
+    return window.sessionStorage;
+  } catch {
+    return { getItem: () => null, setItem: () => undefined, removeItem: () => undefined };
+  }
+}
+
+/**
+ * A button that was clicked does not keep the keyboard: the next Space or Enter would press it again,
+ * and one of them may be what moves the camera. Reached by Tab it keeps it, for the keys are meant.
+ */
+export function letGoOfButtons(): void {
+  document.addEventListener('click', ({ detail, target }) => {
+    if (detail === 0) return; // by key
+    const button = target instanceof Element ? target.closest('button') : null;
+    if (button && !button.closest('dialog')) button.blur();
+  });
+}
+
+/** True while keys are text. */
+export const isTextField = (target: EventTarget | null): boolean =>
+  target instanceof HTMLInputElement ||
+  target instanceof HTMLTextAreaElement ||
+  target instanceof HTMLSelectElement;
+
+/** True for a key that belongs to an input method: a letter being composed, not a command. */
+export const isComposing = (event: KeyboardEvent): boolean =>
+  event.isComposing || event.key === 'Process' || event.key === 'Dead';

@@ -90,7 +90,8 @@ export class GazeController implements HeadActions {
       if (lease.kind !== 'waiting') return;
       const { gaze, participants } = this.session;
       const taken = participants.some(
-        ({ participantId, role }) => participantId === gaze?.pilot?.participantId && role === 'wearer',
+        ({ participantId, role }) =>
+          participantId === gaze?.pilot?.participantId && role === 'wearer',
       );
       throw new GazeError(
         `${taken ? 'The wearer has taken over' : `${lease.pilot} pilots`}. You are ${ordinal(lease.position)} in the queue: try again when it is your turn.`,

@@ -69,6 +69,7 @@ export class GazePanel {
     const words = gazeWords({ gaze, annotation });
     setText(this.mark, words.mark);
     setText(this.text, words.text);
+    this.text.title = annotation?.text ?? ''; // all of it: the words may be cut
     setText(this.number, words.number);
     setText(this.advice, words.advice);
     setClass(this.element, 'warn', words.warn);

@@ -1,4 +1,5 @@
-import type { Gaze, HeadAngles } from '../session/gaze';
+import { charactersOf } from '../scene/characters';
+import { type Gaze, type HeadAngles, ownHandover } from '../session/gaze';
 import type { Lease } from '../session/gaze_pilot';
 import type { Annotation, Participant } from '../session/types';
 
@@ -54,7 +55,7 @@ export function targetWords({ gaze, annotation }: GazeInput): string {
   switch (gaze?.target?.kind) {
     case 'annotation':
       if (!annotation) return 'a mark';
-      return annotation.text ? `“${shorten(annotation.text)}”` : `a ${annotation.shape}`;
+      return annotation.text ? `“${shorten(annotation.text)}”` : SHAPE_WORDS[annotation.shape];
     case 'feature':
       return `feature ${gaze.target.featureId}`;
     case 'point':
@@ -64,7 +65,12 @@ export function targetWords({ gaze, annotation }: GazeInput): string {
   }
 }
 
-const shorten = (text: string): string => (text.length > 24 ? `${text.slice(0, 23)}…` : text);
+const SHAPE_WORDS = { cube: 'a cube', note: 'a note', arrow: 'an arrow', ink: 'a stroke' } as const;
+
+function shorten(text: string): string {
+  const characters = charactersOf(text);
+  return characters.length > 24 ? `${characters.slice(0, 23).join('')}…` : text;
+}
 
 export function gazeWords(input: GazeInput): GazeWords {
   const { gaze } = input;
@@ -170,10 +176,11 @@ export function steerWords({ gaze, lease, me, participants }: SteerInput): strin
   return parts.join(' · ');
 }
 
-/** A change of hands for everybody to read. */
-export function handoverWords(gaze: Gaze, me: string): string {
+/** A change of hands for everybody to read; `lostBy`: my name, where it was I who piloted before. */
+export function handoverWords(gaze: Gaze, me: string, lostBy?: string): string {
   const mine = gaze.pilot !== undefined && gaze.pilot.participantId === me;
-  const words = gaze.lastHandover;
+  const told = gaze.lastHandover;
+  const words = lostBy === undefined ? told : ownHandover(told, lostBy);
   if (!words) return '';
   if (!mine) return `Camera: ${words}.`;
   return words === `${gaze.pilot.name} pilots`

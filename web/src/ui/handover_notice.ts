@@ -9,6 +9,7 @@ export class HandoverNotice {
   readonly element = h('p', { class: 'handover', role: 'status' });
   private seen: { readonly participantId: string; readonly handovers: number } | undefined;
   private untilMs = 0;
+  private piloted = false; // it was I, until now
 
   constructor(private readonly session: Session) {}
 
@@ -20,9 +21,11 @@ export class HandoverNotice {
     this.seen = { participantId, handovers }; // what was before we came is no news
     if (news) {
       this.untilMs = nowMs + SHOWN_MS;
-      setText(this.element, handoverWords(gaze, participantId));
+      const lostBy = this.piloted ? this.session.displayName : undefined;
+      setText(this.element, handoverWords(gaze, participantId, lostBy));
     } else if (nowMs > this.untilMs) {
       setText(this.element, '');
     }
+    this.piloted = gaze.pilot !== undefined && gaze.pilot.participantId === participantId;
   }
 }

@@ -1,7 +1,8 @@
 import { pageNowMs } from '../session/clock';
 import type { LatencyMeter } from '../session/latency';
-import { cleanName, keepName, recallName } from '../session/name';
+import { cleanName, keepName, MAX_NAME_BYTES, recallName } from '../session/name';
 import type { Session } from '../session/session';
+import { bytesOf } from '../tools/note_text';
 import { h, setClass, setText, storage } from './dom';
 import type { Player } from './player';
 import { presenceWords, statusWords } from './words';
@@ -68,7 +69,6 @@ function nameField(rename: (name: string) => void): HTMLElement {
   const input = h('input', {
     class: 'name',
     type: 'text',
-    maxlength: '60',
     autocomplete: 'nickname',
     'aria-label': 'Your name',
     title:
@@ -76,14 +76,24 @@ function nameField(rename: (name: string) => void): HTMLElement {
   });
   let name = recallName(location.search, storage());
   input.value = name;
+  // Said, and left as it is: nobody is called half a name without knowing it.
+  input.addEventListener('input', () => {
+    const left = MAX_NAME_BYTES - bytesOf(input.value.trim());
+    input.setCustomValidity(left < 0 ? `${-left} bytes too long` : '');
+    input.reportValidity();
+  });
   input.addEventListener('change', () => {
+    if (!input.checkValidity()) return;
     name = cleanName(input.value) || name;
     input.value = name;
     keepName(name, storage());
     rename(name);
   });
   input.addEventListener('keydown', ({ key }) => {
-    if (key === 'Escape') input.value = name;
+    if (key === 'Escape') {
+      input.value = name;
+      input.setCustomValidity('');
+    }
     if (key === 'Enter' || key === 'Escape') input.blur();
   });
   return input;

@@ -6,7 +6,7 @@ import { h } from './dom';
 const LEGEND: readonly [FeatureState, string, string][] = [
   ['measured', '●', 'measured in this picture'],
   ['failed', '✕', 'searched for, not found'],
-  ['not_attempted', '○', 'not searched for'],
+  ['not_attempted', '○', 'not searched for in this picture: drawn where the map has it'],
 ];
 
 /** What the keys do and what the colours mean, as a sheet over the page. */

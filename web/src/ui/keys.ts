@@ -7,6 +7,7 @@ import {
   TOOLS,
 } from '../tools/tools';
 import type { Controller } from './controller';
+import { isComposing, isTextField } from './dom';
 import type { GazeController } from './gaze_controller';
 import type { Help } from './help';
 import type { MapPane } from './map_pane';
@@ -28,7 +29,7 @@ export function handleKeys(
   help: Help,
 ): void {
   document.addEventListener('keydown', (event) => {
-    if (event.target instanceof HTMLInputElement || help.dialog.open) return;
+    if (isTextField(event.target) || isComposing(event) || help.dialog.open) return;
     const name = controlOf(event);
     if (event.key === '?') help.toggle();
     if (event.key === 'Escape') controller.escape();
@@ -44,7 +45,9 @@ export function handleKeys(
     event.preventDefault();
   });
   video.element.addEventListener('keydown', (event) => {
-    if (event.target === video.element && event.key === 'Enter') controller.clickMiddle('video');
+    if (event.target !== video.element || event.key !== 'Enter') return;
+    event.preventDefault(); // it is not the first line of a note that this opens
+    if (!event.repeat) controller.clickMiddle('video');
   });
 }
 
@@ -77,7 +80,7 @@ function moveMap(event: KeyboardEvent, pane: MapPane, controller: Controller): b
       map.orbit.zoom(1 / 0.85);
       break;
     case 'Enter':
-      controller.clickMiddle('map');
+      if (!event.repeat) controller.clickMiddle('map');
       return true;
     default:
       return false;

@@ -1,11 +1,12 @@
+import type { Scale } from '../session/types';
 import { colourOf, type Mark, markOf } from '../scene/strokes';
 import type { AnnotationBook } from '../session/annotation_book';
 
 /** Everything to draw: the server's annotations, and ours that it has not answered yet. */
-export function allMarks(book: AnnotationBook): Mark[] {
+export function allMarks(book: AnnotationBook, scale: Scale): Mark[] {
   const marks = book
     .list()
-    .map(markOf)
+    .map((annotation) => markOf(annotation, scale))
     .filter((mark) => mark !== undefined);
   for (const pending of book.pendingList()) {
     if (!pending.pointInWorld) continue;

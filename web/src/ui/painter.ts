@@ -1,15 +1,15 @@
 import type { Pixel } from '../geometry/vec3';
 import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { EdgeArrow } from '../scene/edge_arrows';
-import type { AxisStroke, Marks } from '../scene/strokes';
+import type { AxisStroke, Label, Marks } from '../scene/strokes';
 import type { FeatureState } from '../session/types';
+import { drawLabel, FONT } from './draw_label';
 
 const LINE = '#ffffff';
 const ACCENT = '#c4b0ff';
 const HALO = 'rgba(0, 0, 0, 0.65)';
 const AXIS = '#c9ccd0';
 const MAX_RING_PX = 120;
-const FONT = '600 13px system-ui, sans-serif';
 
 /** Draws pixels of a view onto a canvas laid over it. */
 export class Painter {
@@ -97,31 +97,19 @@ export class Painter {
       this.stroke(chosen(annotationId) ? ACCENT : colour, 2);
       this.context.setLineDash([]);
     }
-    for (const { text, at, hollow, annotationId, colour } of labels) {
-      this.label(text, at, chosen(annotationId) ? ACCENT : colour, hollow);
+    const topmost = labels.filter(({ annotationId }) => chosen(annotationId));
+    for (const label of labels.filter(({ annotationId }) => !chosen(annotationId))) {
+      this.label(label, label.colour, false);
     }
+    // The chosen one says all it has to say, where there is room for it.
+    for (const label of topmost) this.label(label, ACCENT, true);
   }
 
-  /** A filled box with text, its lower left corner beside a point. */
-  private label(text: string, at: Pixel, colour: string, hollow: boolean): void {
-    const { context, ratio } = this;
-    context.font = FONT.replace('13', String(13 * ratio));
-    const width = context.measureText(text).width + 12 * ratio;
-    const height = 21 * ratio;
-    const x = this.x(at) + 6 * ratio;
-    const y = this.y(at) - height - 4 * ratio;
-    context.fillStyle = 'rgba(16, 17, 18, 0.86)';
-    context.strokeStyle = colour;
-    context.lineWidth = 1.5 * ratio;
-    if (hollow) context.setLineDash([4 * ratio, 4 * ratio]);
-    context.beginPath();
-    context.roundRect(x, y, width, height, 4 * ratio);
-    context.fill();
-    context.stroke();
-    context.setLineDash([]);
-    context.fillStyle = colour;
-    context.textBaseline = 'middle';
-    context.fillText(text, x + 6 * ratio, y + height / 2 + ratio / 2);
+  private label(label: Label, colour: string, whole: boolean): void {
+    const { at, hollow } = label;
+    const pane = whole ? { width: this.right, height: this.canvas.height } : undefined;
+    const place = { x: this.x(at), y: this.y(at), ratio: this.ratio, pane };
+    drawLabel(this.context, label, place, { colour, hollow });
   }
 
   /** Towards marks outside the picture: filled, or an outline where not to be trusted. */

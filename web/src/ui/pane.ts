@@ -9,6 +9,7 @@ import { targetLabel } from './gaze_words';
 import { allMarks } from './marks';
 import { Painter } from './painter';
 import type { Player } from './player';
+import { dated } from './words';
 
 /** What the map and the video share: a picture, the same marks above it, and a line of words. */
 export abstract class Pane {
@@ -45,7 +46,7 @@ export abstract class Pane {
 
   /** Axes and every mark in `view`; returns the marks. */
   protected drawMarks(view: View): readonly Mark[] {
-    const marks = allMarks(this.session.annotations);
+    const marks = allMarks(this.session.annotations, this.session.scale);
     this.painter.axes(axisStrokes(view));
     this.painter.marks(strokesOf(view, marks), this.accented);
     return marks;
@@ -66,6 +67,8 @@ export abstract class Pane {
     if (hover?.pane !== this.name || !hover.landing) return;
     const pixel = at(hover, view);
     if (!pixel) return;
-    this.painter.ring(pixel, ringRadius(view, hover.landing), landingWords(hover.landing));
+    const { scale, ageMs } = this.session;
+    const words = dated(landingWords(view, hover.landing, scale.metric), ageMs);
+    this.painter.ring(pixel, ringRadius(view, hover.landing), words);
   }
 }

@@ -29,6 +29,7 @@ export class Player implements PictureSink {
       picture: (frame, decodedMs) => {
         this.next?.frame.close(); // never shown: a newer one came before the screen's next frame
         this.next = { frame, decodedMs };
+        this.session?.decoded(); // not by a timer: in the background those run once a minute
       },
       keyFrameNeeded: () => this.session?.requestKeyFrame(),
     });

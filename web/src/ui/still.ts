@@ -1,7 +1,6 @@
 import { pageNowMs } from '../session/clock';
-import type { SeenFeature } from '../session/map_state';
 import type { Session } from '../session/session';
-import type { FrameFacts } from '../session/types';
+import type { Feature, FrameFacts } from '../session/types';
 
 /**
  * A frame held on the screen, to be looked at and clicked while the live picture goes on. At once as
@@ -10,8 +9,8 @@ import type { FrameFacts } from '../session/types';
 export class Still {
   readonly canvas = document.createElement('canvas');
   readonly sinceMs = pageNowMs();
-  /** What that frame saw, for as long as it is held. */
-  readonly seen: readonly SeenFeature[] | undefined;
+  /** The map as it was then, for as long as it is held: its pose says nothing about a later one. */
+  readonly features: readonly Feature[];
   private readonly sessionId: string;
 
   constructor(
@@ -19,7 +18,7 @@ export class Still {
     live: HTMLCanvasElement,
     private readonly session: Session,
   ) {
-    this.seen = session.map.seenIn(facts.frameId) ?? session.map.seenUpTo(facts.frameId);
+    this.features = [...session.map.features.values()];
     this.sessionId = session.sessionId;
     this.canvas.className = 'still';
     this.canvas.width = live.width;

@@ -1,6 +1,7 @@
 import { type LatencyMeter, STAGES } from '../session/latency';
 import type { Session } from '../session/session';
 import { h, setText } from './dom';
+import { counted } from './words';
 
 /** The bottom line: where the time goes, and what was lost. */
 export class Strip {
@@ -42,12 +43,12 @@ export class Strip {
 function lossWords({ statistics }: Session, pageFps: number): string {
   const parts: string[] = [];
   if (pageFps > 0 && pageFps < 45)
-    parts.push(`this page draws only ${pageFps.toFixed(0)} times a second`);
+    parts.push(`this page draws only ${counted(Math.round(pageFps), 'time')} a second`);
   if (!statistics) return parts.join(' · ');
   const { badFrames, framesDropped, eventsSkipped, videoBitRate, trackedFps } = statistics;
-  if (badFrames > 0) parts.push(`${badFrames} bad frames`);
-  if (framesDropped > 0) parts.push(`${framesDropped} frames not tracked`);
-  if (eventsSkipped > 0) parts.push(`${eventsSkipped} events skipped`);
+  if (badFrames > 0) parts.push(counted(badFrames, 'bad frame'));
+  if (framesDropped > 0) parts.push(`${counted(framesDropped, 'frame')} not tracked`);
+  if (eventsSkipped > 0) parts.push(`${counted(eventsSkipped, 'event')} skipped`);
   parts.push(`tracked ${trackedFps.toFixed(0)} Hz`, `${(videoBitRate / 1e6).toFixed(1)} Mbit/s`);
   return parts.join(' · ');
 }

@@ -10,6 +10,7 @@ import { arrowLabel } from './gaze_words';
 import { Pane } from './pane';
 import type { Player } from './player';
 import { Still } from './still';
+import { crowdedWords } from './words';
 
 const STALE_MS = 1000;
 
@@ -121,18 +122,28 @@ export class VideoPane extends Pane {
   }
 
   /**
-   * Where exactly this frame saw them. Without a report for this very frame, their places are
-   * projected with this frame's own pose, with the newest state known at that time.
+   * As measured, or sought in vain, only what this very frame says so of, and where it says. All others
+   * are where its own pose puts them, as not searched for: what another frame saw is not seen here.
    */
   private drawFeatures(facts: FrameFacts, view: View): void {
     const { map } = this.session;
-    const exact = map.seenIn(facts.frameId);
-    const seen = exact ?? this.still?.seen ?? map.seenUpTo(facts.frameId) ?? [];
-    for (const { id, state, pixel } of seen) {
-      const feature = map.features.get(id);
-      const at = exact || this.still ? pixel : feature && projectPoint(view, feature.pointInWorld);
-      if (at && facts.camera.inImage(at)) this.painter.feature(at, state);
+    const sameMap = this.still !== undefined || facts.pose?.mapRevision === map.revision;
+    for (const { id, pointInWorld } of sameMap
+      ? (this.still?.features ?? map.features.values())
+      : []) {
+      if (facts.features?.has(id)) continue;
+      const at = projectPoint(view, pointInWorld);
+      if (at && facts.camera.inImage(at)) this.painter.feature(at, 'not_attempted');
     }
+    for (const { state, pixel } of facts.features?.values() ?? []) {
+      if (facts.camera.inImage(pixel)) this.painter.feature(pixel, state);
+    }
+  }
+
+  /** False if the map has jumped since the frame shown: its pose says nothing about today's map. */
+  get sameMap(): boolean {
+    const facts = this.current()?.facts;
+    return facts?.pose?.mapRevision === this.session.pose?.mapRevision;
   }
 
   private updateNote(): void {
@@ -144,8 +155,11 @@ export class VideoPane extends Pane {
     let text = '';
     if (player.unsupported) text = `No video. ${player.unsupported}`;
     else if (refusal) text = refusal;
-    else if (still) text = `frozen, ${((nowMs - still.sinceMs) / 1000).toFixed(0)} s: P goes on`;
-    else if (player.shown && stale) text = `picture is ${(age / 1000).toFixed(0)} s old`;
+    else if (session.link.kind === 'crowded') text = crowdedWords(session.link.tabs);
+    else if (still) {
+      text = `frozen, ${((nowMs - still.sinceMs) / 1000).toFixed(0)} s: P goes on`;
+      if (!this.sameMap) text += '. The map has changed since: marks are not where they were';
+    } else if (player.shown && stale) text = `picture is ${(age / 1000).toFixed(0)} s old`;
     else if (!player.shown && session.live) text = 'waiting for the first picture';
     this.setNote(text);
     this.element.classList.toggle('stale', stale && !still);

@@ -1,7 +1,7 @@
 import { pageNowMs } from '../session/clock';
 import { hasHead } from '../session/gaze';
 import type { Session } from '../session/session';
-import { h, setClass, setText } from './dom';
+import { h, isComposing, setClass, setText } from './dom';
 import type { Player } from './player';
 import { WearerHead } from './wearer_head';
 import { presenceWords, statusWords } from './words';
@@ -15,7 +15,7 @@ export class WearerApp {
   private readonly words = h('span', {});
   private readonly line = h('p', { class: 'line', role: 'status' }, this.mark, this.words);
   private readonly watchers = h('p', { class: 'watchers' });
-  private readonly pauseButton = h('button', { type: 'button', class: 'pause' });
+  private readonly pauseButton = h('button', { type: 'button', class: 'pause', title: 'P' });
   private readonly head: WearerHead;
   private readonly fullButton = h('button', { type: 'button', class: 'full' }, 'Full screen');
   private readonly notice = h('p', { class: 'notice', role: 'alert' });
@@ -39,9 +39,13 @@ export class WearerApp {
     this.pauseButton.addEventListener('click', () => this.togglePause());
     this.fullButton.addEventListener('click', () => this.toggleFull());
     document.addEventListener('keydown', (event) => {
-      if (event.key === ' ' && event.target === document.body) this.togglePause();
-      if (event.key.toLowerCase() === 'f') this.toggleFull();
-      if (event.key.toLowerCase() === 'x' && !event.repeat) this.head.toggleStop();
+      // No key that also presses a button: what a press does is done once.
+      if (event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
+      if (isComposing(event)) return;
+      const key = event.key.toLowerCase();
+      if (key === 'p') this.togglePause();
+      if (key === 'f') this.toggleFull();
+      if (key === 'x') this.head.toggleStop();
     });
   }
 

@@ -8,7 +8,7 @@ const SHOWN_MS = 6000;
 
 /** What the wearer can always do to the head, whoever pilots: stop it, and take it over. */
 export class WearerHead {
-  readonly stop = h('button', { type: 'button', class: 'head hidden' });
+  readonly stop = h('button', { type: 'button', class: 'head hidden', title: 'X' });
   readonly take = h('button', { type: 'button', class: 'head hidden' });
   private failure = { text: '', untilMs: 0 };
 

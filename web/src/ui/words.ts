@@ -1,4 +1,14 @@
-import type { Annotation, Link, Pose } from '../session/types';
+import { spanWords } from '../session/silence';
+import { MAX_STREAMS } from '../session/tabs';
+import {
+  type Annotation,
+  doNotTrust,
+  excessOf,
+  type Link,
+  type Pose,
+  type Scale,
+  type Shape,
+} from '../session/types';
 
 /** The state of things in words, with what to do about it. Never colour alone: a shape as well. */
 export interface StatusWords {
@@ -19,11 +29,13 @@ export function statusWords({ link, pose, sourceEnded, nowMs }: StatusInput): St
   switch (link.kind) {
     case 'connecting':
       return { mark: '◌', text: 'connecting', advice: '', warn: false };
+    case 'crowded':
+      return { mark: '■', text: 'too many tabs', advice: crowdedWords(link.tabs), warn: true };
     case 'refused':
       return { mark: '■', text: 'refused', advice: link.reason, warn: true };
     case 'reconnecting': {
-      const seconds = Math.max(0, Math.round((nowMs - link.sinceMs) / 1000));
-      return { mark: '◌', text: `reconnecting, ${seconds} s`, advice: link.reason, warn: true };
+      const span = spanWords(nowMs - link.sinceMs);
+      return { mark: '◌', text: `reconnecting, ${span}`, advice: link.reason, warn: true };
     }
     case 'live':
       break;
@@ -38,6 +50,10 @@ export function statusWords({ link, pose, sourceEnded, nowMs }: StatusInput): St
   }
   return trackingWords(pose);
 }
+
+/** Why a page stands still while other tabs of the same browser do not, and what to do. */
+export const crowdedWords = (tabs: number): string =>
+  `Saccade is open in ${tabs} other tabs of this browser, which has connections for ${MAX_STREAMS} at a time. Close ${tabs - MAX_STREAMS + 1} of them: this one then goes on by itself.`;
 
 function trackingWords(pose: Pose | undefined): StatusWords {
   switch (pose?.status) {
@@ -85,32 +101,54 @@ function trackingWords(pose: Pose | undefined): StatusWords {
   }
 }
 
+/** "1 frame", "2 frames". */
+export const counted = (count: number, thing: string): string =>
+  `${count} ${thing}${count === 1 ? '' : 's'}`;
+
+/** What a person calls a mark of this shape. */
+export const shapeWord = (shape: Shape): string => (shape === 'ink' ? 'stroke' : shape);
+
 /** "2 experts, 1 wearer". */
 export function presenceWords(participants: readonly { readonly role: string }[]): string {
   const counts = ['expert', 'wearer', 'viewer'].map((role) => {
     const count = participants.filter((participant) => participant.role === role).length;
-    return count === 0 ? '' : `${count} ${role}${count === 1 ? '' : 's'}`;
+    return count === 0 ? '' : counted(count, role);
   });
   return counts.filter(Boolean).join(', ');
 }
 
-/** Error of an anchor: "0.8 px  3 mm", or why it is not to be trusted. */
-export function anchorWords(
-  { anchor }: Annotation,
-  metric: boolean,
-): { text: string; warn: boolean } {
-  if (anchor.state === 'paused') {
-    return { text: `do not trust${anchor.reason ? `: ${anchor.reason}` : ''}`, warn: true };
-  }
-  if (anchor.state === 'stopped') {
-    return { text: `stopped${anchor.reason ? `: ${anchor.reason}` : ''}`, warn: true };
-  }
-  if (!anchor.pointInWorld) return { text: 'place not known', warn: true };
-  const px = anchor.errorPx === undefined ? 'out of view' : `${anchor.errorPx.toFixed(1)} px`;
-  const size = metric ? ` · ${millimetres(anchor.errorMm)}` : ' · scale unknown';
-  return { text: `${px}${size}`, warn: false };
+/** With its age, if it is old. */
+export const dated = (text: string, ageMs: number | undefined): string =>
+  ageMs === undefined ? text : `${text} · as of ${spanWords(ageMs)} ago`;
+
+/** Error of an anchor: "0.8 px · 3 mm", or why it is not to be trusted. */
+export function anchorWords({ anchor }: Annotation, scale: Scale): { text: string; warn: boolean } {
+  const { state, reason, errorPx, errorMm, pointInWorld } = anchor;
+  const { metric } = scale;
+  const why = placeable(reason, metric);
+  if (state === 'paused') return { text: `do not trust${why ? `: ${why}` : ''}`, warn: true };
+  if (state === 'stopped') return { text: `stopped${why ? `: ${why}` : ''}`, warn: true };
+  if (!pointInWorld) return { text: 'place not known', warn: true };
+  const px = errorPx === undefined ? 'out of view' : `${errorPx.toFixed(1)} px`;
+  const size = metric ? ` · ${millimetres(errorMm)}` : ' · scale unknown';
+  if (!doNotTrust(anchor, scale)) return { text: `${px}${size}`, warn: false };
+  const error = excessOf(anchor, scale).mm ? millimetres(errorMm) : px;
+  return { text: `do not trust: expected error ${error}`, warn: true };
 }
 
-function millimetres(mm: number): string {
-  return mm < 100 ? `${mm.toFixed(mm < 9.95 ? 1 : 0)} mm` : `${(mm / 10).toFixed(0)} cm`;
+/** The server's reason, without what nobody can do here, and without lengths where there is no scale. */
+function placeable(reason: string, metric: boolean): string {
+  const possible = reason.replace(/; move it$/, '; delete it and place it anew');
+  return metric
+    ? possible
+    : possible.replace(
+        /expected error [\d.]+ mm is above [\d.]+ mm/,
+        'too uncertain; scale unknown',
+      );
+}
+
+/** "3.0 mm", "53 cm", "2.3 m". */
+export function millimetres(mm: number): string {
+  if (mm < 100) return `${mm.toFixed(mm < 9.95 ? 1 : 0)} mm`;
+  return mm < 995 ? `${(mm / 10).toFixed(0)} cm` : `${(mm / 1000).toFixed(1)} m`;
 }

@@ -36,3 +36,29 @@ export const mean = (points) =>
   points.reduce((sum, p) => [sum[0] + p[0] / points.length, sum[1] + p[1] / points.length], [0, 0]);
 
 export const median = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
+
+/** Connected pixels (also at corners): {size, width, height, middle} of each. */
+export function blobsOf(pixels) {
+  const key = (x, y) => 65536 * y + x;
+  const left = new Map(pixels.map(([x, y]) => [key(x, y), [x, y]]));
+  const blobs = [];
+  for (const first of pixels) {
+    if (!left.delete(key(...first))) continue;
+    const found = [first];
+    for (let i = 0; i < found.length; ++i) {
+      const [x, y] = found[i];
+      for (let k = 0; k < 9; ++k) {
+        const at = [x + (k % 3) - 1, y + Math.floor(k / 3) - 1];
+        if (left.delete(key(...at))) found.push(at);
+      }
+    }
+    const extent = (axis) => {
+      const values = found.map((point) => point[axis]);
+      return [Math.min(...values), Math.max(...values)];
+    };
+    const [[x0, x1], [y0, y1]] = [extent(0), extent(1)];
+    const middle = [(x0 + x1) / 2, (y0 + y1) / 2];
+    blobs.push({ size: found.length, width: x1 - x0 + 1, height: y1 - y0 + 1, middle });
+  }
+  return blobs;
+}

@@ -1,6 +1,7 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze]   (page: everything but the turning of the head; gaze: that alone)
+//        [--part page|gaze|dots|person]   (gaze: the turning of the head; dots: measured features while the
+//        wearer turns; person: typing, keys, tabs, a reload; page: everything else)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -33,10 +34,14 @@ for (const [path, remedy] of Object.entries(needed)) {
   console.log(`skipped: no ${path}; ${remedy}`);
   process.exit(77);
 }
-const runChecks =
-  options.part === 'gaze'
-    ? (await import('./gaze.mjs')).runGaze
-    : (await import('./checks.mjs')).runChecks;
+const PARTS = {
+  page: async () => (await import('./checks.mjs')).runChecks,
+  gaze: async () => (await import('./gaze.mjs')).runGaze,
+  dots: async () => (await import('./dots.mjs')).runDots,
+  person: async () => (await import('./person.mjs')).runPerson,
+};
+if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);
+const runChecks = await PARTS[options.part]();
 
 const folder = mkdtempSync(join(tmpdir(), 'saccade-browser-test-'));
 /** A port that is free now: the restarted server has to come back to the same one. */

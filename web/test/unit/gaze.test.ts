@@ -15,12 +15,20 @@ import { IDENTITY } from '../../src/geometry/rigid3';
 import { makeView } from '../../src/geometry/view';
 import { sightInPicture } from '../../src/scene/gaze_sight';
 import type { Gaze } from '../../src/session/gaze';
+import type { Annotation } from '../../src/session/types';
 import { toGaze } from '../../src/session/gaze_convert';
 import { GazePilot } from '../../src/session/gaze_pilot';
 import { Session } from '../../src/session/session';
 import type { Clients } from '../../src/transport/clients';
 import { LeaseLoop, type LeaseTold } from '../../src/transport/lease_loop';
-import { gazeWords, handoverWords, ordinal, sideOf, steerWords } from '../../src/ui/gaze_words';
+import {
+  gazeWords,
+  handoverWords,
+  ordinal,
+  sideOf,
+  steerWords,
+  targetWords,
+} from '../../src/ui/gaze_words';
 
 const granted = (leaseId: string) => create(AcquireLeaseResponseSchema, { granted: true, leaseId });
 const queued = (queuePosition: number) =>
@@ -201,7 +209,7 @@ describe('GazePilot', () => {
     await pilot.acquire();
     tell({ kind: 'refused', reason: 'the lease has ended' });
     await settle();
-    expect(pilot.lost).toBe('You pilot no longer: this page was not heard in time.');
+    expect(pilot.lost).toBe('You pilot no longer: this page was not heard in time; nobody pilots.');
     expect(calls.at(-1)).toBe('keep no more');
   });
 
@@ -219,6 +227,22 @@ describe('GazePilot', () => {
     tell({ ...inQueue, queuePosition: 1, pilot: 'wearer' });
     expect(pilot.lease).toEqual({ kind: 'waiting', position: 1, pilot: 'wearer' });
     expect(pilot.lost).toBe('');
+  });
+
+  it('tells nobody of herself by name: somebody else waited', async () => {
+    const { pilot, state, tell } = begin(mine);
+    await pilot.acquire();
+    Object.assign(
+      state,
+      create(GazeStateSchema, {
+        pilot: { participantId: 'b', displayName: 'Bob' },
+        lastHandover: 'Ann vanished; Bob pilots',
+      }),
+    );
+    tell({ kind: 'refused', reason: 'the lease has ended' });
+    await vi.waitFor(() => expect(pilot.lost).toContain('heard'));
+    expect(pilot.lost).toBe('You pilot no longer: this page was not heard in time; Bob pilots.');
+    await pilot.release();
   });
 
   it('drops the lease of a session that is over', async () => {
@@ -249,7 +273,7 @@ describe('GazePilot', () => {
     );
     Object.assign(session.clients.gaze, { fixate: refuse });
     const looked = pilot.fixate({ kind: 'feature', featureId: 7 }, true);
-    await expect(looked).rejects.toThrow(/^7 is not in the map$/);
+    await expect(looked).rejects.toThrow(/^that feature is no longer in the map: click again$/);
     expect(refuse).toHaveBeenCalledWith(
       { sessionId: 's1', target: { target: { case: 'featureId', value: 7n } }, fast: true },
       expect.anything(),
@@ -326,6 +350,24 @@ describe('words of the gaze', () => {
     expect(say('c', participants)).toBe('the wearer has taken over · Bob waits');
     expect(handoverWords(gaze, 'c')).toBe('Camera: Bob released; Ann pilots.');
     expect(handoverWords(gaze, 'a')).toBe('You pilot the camera now: Bob released; Ann pilots.');
+    const late = gazeOf({ pilot: bob, lastHandover: 'Ann vanished; Bob pilots' });
+    expect(handoverWords(late, 'c')).toBe('Camera: Ann vanished; Bob pilots.');
+    expect(handoverWords(late, 'a', 'Ann')).toBe(
+      'Camera: this page was not heard in time; Bob pilots.',
+    );
+  });
+
+  it('have an article that fits', () => {
+    const target = { target: { case: 'annotationId', value: 'm' } } as const;
+    const gaze = gazeOf({ mode: GazeMode.SACCADE, target });
+    const word = (shape: 'cube' | 'note' | 'arrow' | 'ink') =>
+      targetWords({ gaze, annotation: { shape, text: '' } as Annotation });
+    expect((['cube', 'note', 'arrow', 'ink'] as const).map(word)).toEqual([
+      'a cube',
+      'a note',
+      'an arrow',
+      'a stroke',
+    ]);
   });
 });
 

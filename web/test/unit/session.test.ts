@@ -1,13 +1,20 @@
-import { create } from '@bufbuild/protobuf';
+import { create, type MessageInitShape } from '@bufbuild/protobuf';
 import { describe, expect, it, vi } from 'vitest';
 import { codecOf } from '../../src/decode/h264';
-import { FeatureSchema, FeatureState, MapDeltaSchema } from '../../src/gen/saccade/v1/map_pb';
+import {
+  FeatureSchema,
+  FeatureState,
+  FrameFeaturesSchema,
+  MapDeltaSchema,
+} from '../../src/gen/saccade/v1/map_pb';
 import { AnnotationEventSchema } from '../../src/gen/saccade/v1/session_pb';
 import { AnnotationSchema } from '../../src/gen/saccade/v1/annotation_pb';
+import { AccessUnitSchema } from '../../src/gen/saccade/v1/video_pb';
 import { Camera } from '../../src/geometry/camera';
 import { Acknowledger } from '../../src/session/acknowledger';
 import { AnnotationBook } from '../../src/session/annotation_book';
 import { ClockOffset } from '../../src/session/clock';
+import { FrameReader } from '../../src/session/frame_reader';
 import { LatencyMeter, RateMeter, stageTimes } from '../../src/session/latency';
 import { MapState } from '../../src/session/map_state';
 import { FrameRing } from '../../src/session/ring';
@@ -137,39 +144,96 @@ describe('Acknowledger', () => {
   });
 });
 
+describe('an acknowledgement', () => {
+  const begin = (proceed: boolean) => {
+    const sent: bigint[] = [];
+    let now = 0;
+    const acknowledger = new Acknowledger({
+      every: 8,
+      mayProceed: () => proceed,
+      nowMs: () => now,
+      send: (sequence) => {
+        sent.push(sequence);
+        return Promise.resolve();
+      },
+    });
+    const at = async (ms: number, act: () => void) => {
+      now = ms;
+      act();
+      await new Promise((resolve) => setTimeout(resolve, 0));
+    };
+    return { acknowledger, sent, at };
+  };
+
+  it('goes out every two seconds, without a timer, and also when there is nothing new', async () => {
+    const { acknowledger, sent, at } = begin(true);
+    await at(500, () => acknowledger.arrived(1n));
+    expect(sent).toEqual([]);
+    await at(2000, () => acknowledger.arrived(2n)); // a hidden page has events, but hardly timers
+    await at(3900, () => acknowledger.arrived(3n));
+    await at(4000, () => acknowledger.flush(8));
+    await at(6000, () => acknowledger.flush());
+    expect(sent).toEqual([2n, 3n, 3n]);
+  });
+
+  it('goes out now and then while the decoder is behind', async () => {
+    const { acknowledger, sent, at } = begin(false);
+    await at(5000, () => acknowledger.arrived(20n));
+    expect(sent).toEqual([]);
+    await at(6000, () => acknowledger.arrived(32n));
+    expect(sent).toEqual([32n]);
+  });
+});
+
 describe('MapState', () => {
   const feature = (id: bigint, u: number, state = FeatureState.MEASURED) =>
     create(FeatureSchema, { id, state, pixel: { u, v: 1 }, pointInWorldM: { x: 0, y: 0, z: 1 } });
 
-  it('keeps what each frame saw, and nothing across a reset', () => {
+  it('adds the parts of a state up, and keeps nothing across a reset', () => {
     const map = new MapState();
-    map.apply(
-      create(MapDeltaSchema, {
-        full: true,
-        frameId: 5n,
-        mapGeneration: 1n,
-        upserted: [feature(1n, 10), feature(2n, 20)],
-      }),
-    );
-    map.apply(
-      create(MapDeltaSchema, {
-        frameId: 6n,
-        mapGeneration: 1n,
-        upserted: [feature(1n, 11, FeatureState.FAILED)],
-        removedIds: [2n],
-      }),
-    );
-    expect(map.seenIn(5)?.map((f) => [f.id, f.state, f.pixel?.u])).toEqual([
-      [1, 'measured', 10],
-      [2, 'measured', 20],
-    ]);
-    expect(map.seenIn(6)?.map((f) => [f.id, f.state, f.pixel?.u])).toEqual([[1, 'failed', 11]]);
-    expect(map.seenIn(7)).toBeUndefined();
-    map.apply(
-      create(MapDeltaSchema, { frameId: 7n, mapGeneration: 2n, upserted: [feature(1n, 30)] }),
-    );
+    const delta = (init: MessageInitShape<typeof MapDeltaSchema>) =>
+      map.apply(create(MapDeltaSchema, init));
+    delta({ full: true, mapGeneration: 1n, upserted: [feature(9n, 1)] });
+    delta({ full: true, more: true, mapGeneration: 1n, upserted: [feature(1n, 10)] });
+    delta({ mapGeneration: 1n, upserted: [feature(2n, 20)] });
+    expect([...map.features.keys()]).toEqual([1, 2]);
+    delta({
+      mapGeneration: 1n,
+      upserted: [feature(1n, 11, FeatureState.FAILED)],
+      removedIds: [2n],
+    });
+    expect([...map.features.values()].map((f) => [f.id, f.state])).toEqual([[1, 'failed']]);
+    delta({ mapGeneration: 2n, upserted: [feature(1n, 30)] });
     expect(map.features.size).toBe(1);
-    expect(map.seenIn(5)).toBeUndefined();
+  });
+});
+
+describe('what a frame saw', () => {
+  const read = (frameId: bigint, features?: MessageInitShape<typeof FrameFeaturesSchema>) => {
+    const unit = create(AccessUnitSchema, {
+      frameId,
+      intrinsics: { widthPx: 640, heightPx: 480, fxPx: 500, fyPx: 500, cxPx: 319.5, cyPx: 239.5 },
+      ...(features && { features }),
+    });
+    return new FrameReader().read(unit, undefined, 0)?.features;
+  };
+
+  it("is the frame's own, in sixteenths of a pixel: map.proto's worked number", () => {
+    const seen = read(7n, {
+      measuredIds: [5n],
+      measuredPx16: [5112, 3832],
+      failedIds: [6n],
+      failedPx16: [16, -8],
+    });
+    expect([...(seen ?? [])]).toEqual([
+      [6, { state: 'failed', pixel: { u: 1, v: -0.5 } }],
+      [5, { state: 'measured', pixel: { u: 319.5, v: 239.5 } }],
+    ]);
+  });
+
+  it('is not known where the frame does not say, whatever frames before it said', () => {
+    expect(read(8n)).toBeUndefined();
+    expect(read(9n, {})?.size).toBe(0);
   });
 });
 
@@ -199,6 +263,22 @@ describe('AnnotationBook', () => {
     book.apply(event(false, 'a'));
     book.put(answer);
     expect(book.list()).toHaveLength(1);
+  });
+
+  it('takes a list in parts, and anchors alone only for what it knows', () => {
+    const book = new AnnotationBook();
+    book.apply(event(true, 'old'));
+    book.apply(create(AnnotationEventSchema, { ...event(true, 'a'), more: true }));
+    book.apply(event(false, 'b'));
+    expect(book.list().map(({ id }) => id)).toEqual(['a', 'b']);
+    const { version } = book;
+    const anchor = { errorMm: 3, pointInWorldM: { x: 1, y: 2, z: 3 } };
+    const ids = ['a', 'never heard of'];
+    book.apply(create(AnnotationEventSchema, { anchors: ids.map((id) => ({ id, anchor })) }));
+    expect(book.list().map(({ id }) => id)).toEqual(['a', 'b']);
+    expect(book.get('a')?.anchor).toMatchObject({ errorMm: 3, pointInWorld: { x: 1, y: 2, z: 3 } });
+    expect(book.get('b')?.anchor.errorMm).toBe(0);
+    expect(book.version).toBeGreaterThan(version);
   });
 
   it('forgets what a full list does not have', () => {

@@ -4,11 +4,16 @@ import { IDENTITY } from '../../src/geometry/rigid3';
 import { distance, type Vec3 } from '../../src/geometry/vec3';
 import { makeView, projectPoint } from '../../src/geometry/view';
 import { cubeEdges, markOf, strokesOf } from '../../src/scene/strokes';
+import { readsRightToLeft, wrap } from '../../src/scene/wrap';
 import type { Annotation, Feature } from '../../src/session/types';
+import { bytesOf, cleanText, roomWords } from '../../src/tools/note_text';
 import { landingInMap, landingInVideo, landingWords, ringRadius } from '../../src/tools/landing';
 import { pickNearest } from '../../src/tools/pick';
 import { COMMANDS, controlOf, HEAD_COMMANDS, TOOLS } from '../../src/tools/tools';
-import { anchorWords, presenceWords, statusWords } from '../../src/ui/words';
+import { anchorWords, crowdedWords, dated, presenceWords, statusWords } from '../../src/ui/words';
+
+const METRIC = { metric: true, eye: IDENTITY.translation };
+const NO_SCALE = { ...METRIC, metric: false };
 
 const camera = new Camera({
   model: 'pinhole',
@@ -47,7 +52,8 @@ describe('landing', () => {
     expect(landing?.sigmaM).toBeCloseTo(0.002, 9);
     expect(landing?.target).toEqual({ kind: 'pixel', frameId: 42, pixel: { u: 327.5, v: 239.5 } });
     expect(landing && ringRadius(view, landing)).toBeCloseTo((500 * 0.002) / 2, 6);
-    expect(landing && landingWords(landing)).toBe('±2 mm');
+    expect(landing && landingWords(view, landing, true)).toBe('±2 mm');
+    expect(landing && landingWords(view, landing, false)).toBe('±1 px'); // no scale, no metres
   });
 
   it('takes the plane of the features around', () => {
@@ -60,7 +66,8 @@ describe('landing', () => {
     const landing = landingInVideo(view, 1, { u: 630, v: 20 }, wall);
     expect(landing?.how).toBe('nearby depth');
     expect(landing?.sigmaM).toBeCloseTo(0.6, 6);
-    expect(landing && landingWords(landing)).toBe('±60 cm, depth guessed');
+    expect(landing && landingWords(view, landing, true)).toBe('±60 cm, depth guessed');
+    expect(landing && landingWords(view, landing, false)).toBe('±150 px, depth guessed');
   });
 
   it('does not pretend to know a depth without a map', () => {
@@ -70,6 +77,11 @@ describe('landing', () => {
     expect(unknown?.how).toBe('unknown depth');
     expect(unknown && ringRadius(view, unknown)).toBeUndefined();
     expect(landingInMap(view, { u: 100, v: 100 }, [])).toBeUndefined();
+  });
+
+  it('lands nowhere in an empty corner of the map, however far the rest reaches', () => {
+    expect(landingInMap(view, { u: 630, v: 20 }, wall)).toBeUndefined();
+    expect(landingInVideo(view, 1, { u: 630, v: 20 }, wall)?.how).toBe('nearby depth');
   });
 
   it('in the map names the feature, or the ray', () => {
@@ -107,6 +119,10 @@ const annotation: Annotation = {
     reason: '',
   },
 };
+const withAnchor = (anchor: Partial<Annotation['anchor']>): Annotation => ({
+  ...annotation,
+  anchor: { ...annotation.anchor, ...anchor },
+});
 const paused: Annotation = {
   ...annotation,
   anchor: { ...annotation.anchor, state: 'paused', reason: 'tracking lost' },
@@ -117,24 +133,113 @@ describe('strokes', () => {
     const edges = cubeEdges({ x: 1, y: 2, z: 3 }, 0.05);
     expect(edges).toHaveLength(12);
     for (const [a, b] of edges) expect(distance(a, b)).toBeCloseTo(0.05, 12);
-    const { strokes } = strokesOf(view, [markOf(annotation)!]);
+    const { strokes } = strokesOf(view, [markOf(annotation, METRIC)!]);
     const points = strokes.flatMap((stroke) => stroke.points);
     const mean = points.reduce((sum, p) => sum + p.u, 0) / points.length;
     expect(mean).toBeCloseTo(projectPoint(view, { x: 0, y: 0, z: 1 })?.u ?? NaN, 1);
   });
 
   it('draws hollow, and names, what is not to be trusted', () => {
-    const { strokes, labels } = strokesOf(view, [markOf(paused)!]);
+    const { strokes, labels } = strokesOf(view, [markOf(paused, METRIC)!]);
     expect(strokes.every((stroke) => stroke.hollow)).toBe(true);
     expect(labels.map((label) => label.text)).toEqual(['do not trust']);
+  });
+
+  it('cuts a label between characters only, and keeps all of it beside', () => {
+    const text = `${'👩‍🔧'.repeat(39)} prüfen!`;
+    const [label] = strokesOf(view, [markOf({ ...annotation, text }, METRIC)!]).labels;
+    expect(label?.text).toBe(`${'👩‍🔧'.repeat(39)}…`);
+    expect(label?.whole).toBe(text);
+  });
+});
+
+describe('wrap', () => {
+  const most = (n: number) => (line: string) => line.length <= n;
+
+  it('loses nothing, at spaces and without any', () => {
+    expect(wrap('one two three', most(8))).toEqual(['one two', 'three']);
+    expect(wrap('检查这个阀门是否漏油', most(4))).toEqual(['检查这个', '阀门是否', '漏油']);
+    const long = `see ${'x'.repeat(11)} and this`;
+    expect(wrap(long, most(5)).join('').replaceAll(' ', '')).toBe(long.replaceAll(' ', ''));
+    expect(wrap('', most(5))).toEqual(['']);
+  });
+
+  it('knows where a line begins', () => {
+    expect(readsRightToLeft('5 בדוק')).toBe(true);
+    expect(readsRightToLeft('افحص valve')).toBe(true);
+    expect(readsRightToLeft('Größe בדוק')).toBe(false);
+    expect(readsRightToLeft('42')).toBe(false);
+  });
+});
+
+describe('the text of a note', () => {
+  it('is counted in bytes, as the server does, and cut nowhere', () => {
+    expect(bytesOf('Größe ✓')).toBe(11);
+    expect(roomWords('ä'.repeat(250))).toEqual({ text: '0 of 500 bytes left', over: false });
+    expect(roomWords('ä'.repeat(250) + 'x')).toEqual({
+      text: '1 byte too long: shorten it',
+      over: true,
+    });
+    expect(cleanText(' a\nb\t')).toBe('a b');
   });
 });
 
 describe('words', () => {
   it('gives an anchor its error, or the reason not to trust it', () => {
-    expect(anchorWords(annotation, true)).toEqual({ text: '0.8 px · 3.0 mm', warn: false });
-    expect(anchorWords(annotation, false).text).toBe('0.8 px · scale unknown');
-    expect(anchorWords(paused, true)).toEqual({ text: 'do not trust: tracking lost', warn: true });
+    expect(anchorWords(annotation, METRIC)).toEqual({ text: '0.8 px · 3.0 mm', warn: false });
+    expect(anchorWords(annotation, NO_SCALE).text).toBe('0.8 px · scale unknown');
+    expect(anchorWords(paused, METRIC)).toEqual({
+      text: 'do not trust: tracking lost',
+      warn: true,
+    });
+  });
+
+  it('date what is told while nothing new is heard', () => {
+    const { text } = anchorWords(annotation, METRIC);
+    expect(dated(text, undefined)).toBe('0.8 px · 3.0 mm');
+    expect(dated(text, 12_300)).toBe('0.8 px · 3.0 mm · as of 12 s ago');
+    expect(dated(text, 600_000)).toBe('0.8 px · 3.0 mm · as of 10 min ago');
+  });
+
+  it('do not trust a provisional mark above its limit, nor give its error in millions', () => {
+    const { errorPx, errorMm } = { errorPx: 4, errorMm: 23_087 };
+    const wide = withAnchor({ state: 'provisional', errorPx, errorMm });
+    expect(anchorWords(wide, METRIC)).toEqual({
+      text: 'do not trust: expected error 23.1 m',
+      warn: true,
+    });
+    expect(markOf(wide, METRIC)?.hollow).toBe(true);
+    const coarse = withAnchor({ state: 'provisional', errorPx: 14, errorMm: 4 });
+    expect(anchorWords(coarse, METRIC).text).toBe('do not trust: expected error 14.0 px');
+    const young = withAnchor({ state: 'provisional', errorPx: 2, errorMm: 9 });
+    expect(anchorWords(young, METRIC)).toEqual({ text: '2.0 px · 9.0 mm', warn: false });
+    expect(markOf(young, METRIC)?.hollow).toBe(false);
+    // Far away the server allows a share of the distance: 2 % of 4 m.
+    const pointInWorld = { x: 0, y: 0, z: 4 };
+    const far = withAnchor({ state: 'provisional', errorPx, errorMm: 79, pointInWorld });
+    expect(markOf(far, METRIC)?.hollow).toBe(false);
+    expect(markOf({ ...far, anchor: { ...far.anchor, errorMm: 81 } }, METRIC)?.hollow).toBe(true);
+  });
+
+  it('give no millimetres without scale, whoever says them', () => {
+    const reason = 'expected error 700 mm is above 50 mm';
+    for (const state of ['provisional', 'tracking', 'paused'] as const) {
+      const { text } = anchorWords(withAnchor({ state, errorMm: 700, reason }), NO_SCALE);
+      expect(text).not.toMatch(/\bmm\b|\bcm\b|\d m\b/);
+    }
+  });
+
+  it('ask for nothing that cannot be done here', () => {
+    const reason = 'its place is not known in this map: it was placed in another one; move it';
+    const { text } = anchorWords(withAnchor({ state: 'paused', reason }), METRIC);
+    expect(text).not.toContain('move it');
+  });
+
+  it('say that there are too many tabs, and what to do', () => {
+    const link = { kind: 'crowded', tabs: 4 } as const;
+    const words = statusWords({ link, pose: undefined, sourceEnded: false, nowMs: 0 });
+    expect(words).toMatchObject({ text: 'too many tabs', advice: crowdedWords(4), warn: true });
+    expect(words.advice).toContain('Close 1 of them');
   });
 
   it('counts who is here', () => {

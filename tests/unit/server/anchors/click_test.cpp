@@ -30,7 +30,7 @@ double Mean(const std::vector<double>& values) {
 
 TEST(Click, T30MedianErrorBelowOnePercentOfDepthAndConsistent) {
   std::vector<double> with_neighbours, everywhere, nees, nees_everywhere;
-  int provisional = 0;
+  int untrusted = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
     SyntheticMap::Options options;
     options.seed = seed;
@@ -50,7 +50,7 @@ TEST(Click, T30MedianErrorBelowOnePercentOfDepthAndConsistent) {
       const double squared = error.dot(anchor.covariance_in_world.inverse() * error);
       everywhere.push_back(relative);
       nees_everywhere.push_back(squared);
-      provisional += anchor.state == AnchorState::kProvisional ? 1 : 0;
+      untrusted += anchor.state == AnchorState::kPaused ? 1 : 0;
       if (rig.map.NeighboursOnSurface(pose, pixel, 80.0) < 3) continue;
       with_neighbours.push_back(relative);
       nees.push_back(squared);
@@ -58,9 +58,9 @@ TEST(Click, T30MedianErrorBelowOnePercentOfDepthAndConsistent) {
   }
   std::printf(
       "T30: %zu clicks with 3 neighbours on their surface: median %.2f %% of depth, NEES "
-      "mean %.2f; all %zu clicks: %.2f %%, NEES median %.2f mean %.2f, %d provisional\n",
+      "mean %.2f; all %zu clicks: %.2f %%, NEES median %.2f mean %.2f, %d not trusted\n",
       nees.size(), 100 * Median(with_neighbours), Mean(nees), everywhere.size(),
-      100 * Median(everywhere), Median(nees_everywhere), Mean(nees_everywhere), provisional);
+      100 * Median(everywhere), Median(nees_everywhere), Mean(nees_everywhere), untrusted);
   EXPECT_GT(nees.size(), 100u);
   EXPECT_LT(Median(with_neighbours), 0.01);
   EXPECT_LT(Mean(nees), 4.5);

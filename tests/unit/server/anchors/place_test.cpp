@@ -149,7 +149,7 @@ TEST_F(SeededClick, ProvisionalBecomesTrackingAlongTheClickedRayWithoutAJump) {
   const Eigen::Vector3d ray = (truth - pose_.translation).normalized();
   const double first_error = (edit->annotation.anchor.point_in_world - truth).norm();
   EXPECT_GT(first_error, 0.03) << "the scene is too easy for this test";
-  EXPECT_EQ(edit->annotation.anchor.state, AnchorState::kProvisional);
+  EXPECT_EQ(edit->annotation.anchor.state, AnchorState::kPaused) << "above its limit";
   EXPECT_THAT(edit->annotation.anchor.reason, HasSubstr("move the camera sideways"));
 
   Eigen::Vector3d before = edit->annotation.anchor.point_in_world;
@@ -237,7 +237,7 @@ TEST(Place, MapWithoutMetresStaysPausedAfterAResetUntilMoved) {
   rig.map.Reset(false);
   rig.Show(pose);
   EXPECT_EQ(rig.Only().anchor.state, AnchorState::kPaused);
-  EXPECT_THAT(rig.Only().anchor.reason, HasSubstr("move it"));
+  EXPECT_THAT(rig.Only().anchor.reason, HasSubstr("place it again"));
   AnnotationPatch patch;
   patch.id = rig.Only().id;
   patch.target = PointTarget{rig.Truth(pose, {330, 240})};

@@ -109,6 +109,33 @@ TEST_F(GatewayTest, LeavingBrowserCancelsItsCall) {
   EXPECT_TRUE(Eventually([&] { return service_.open_calls == 0; }));
 }
 
+// One byte more than the request hid the end of the connection.
+TEST_F(GatewayTest, LeavingIsSeenBehindBytesSentTooMuch) {
+  HttpClient ghost(port());
+  ghost.SendCall("/test.v1.Test/Silent", "");
+  ASSERT_TRUE(Eventually([&] { return service_.open_calls == 1; }));
+  ghost.Send("x");
+  std::this_thread::sleep_for(milliseconds(50));
+  ghost.Close();
+  EXPECT_TRUE(Eventually([&] { return service_.open_calls == 0; }));
+}
+
+TEST_F(GatewayTest, PipelinedRequestsAreAnsweredInOrder) {
+  HttpClient client(port());
+  for (int i = 0; i < 200; ++i) client.SendCall("/test.v1.Test/Echo", std::to_string(i));
+  for (int i = 0; i < 200; ++i) {
+    ASSERT_EQ(SplitFrames(client.ReadReply().body)[0].payload, std::to_string(i));
+  }
+}
+
+TEST_F(GatewayTest, AnEndlessPipelineBehindAStreamEndsIt) {
+  HttpClient client(port());
+  client.SendCall("/test.v1.Test/Silent", "");
+  ASSERT_TRUE(Eventually([&] { return service_.open_calls == 1; }));
+  client.Send(std::string(1 << 20, 'x'));
+  EXPECT_TRUE(Eventually([&] { return service_.open_calls == 0; }));
+}
+
 TEST_F(GatewayTest, SlowBrowserHoldsTheStreamInsteadOfFillingMemory) {
   HttpClient client(port(), 4096);
   client.SendCall("/test.v1.Test/Count", "1000 100000");
@@ -162,6 +189,48 @@ TEST_F(GatewayTest, MalformedRequestsGetAStatusAndNoCall) {
   EXPECT_TRUE(garbage.ClosedWithin(seconds(3)));
 }
 
+// A byte that metadata may not hold used to abort the server (gRPC's assertion).
+TEST_F(GatewayTest, ForwardedHeadersWithBytesThatMetadataMayNotHoldAreRefused) {
+  for (const std::string name : {"authorization", "traceparent", "tracestate", "x-request-id"}) {
+    for (const std::string value : {"a\tb", "a\x01z", "a\x7fz", "a\x80z", "\xff"}) {
+      HttpClient client(port());
+      client.SendCall("/test.v1.Test/Echo", "hi", name + ": " + value + "\r\n");
+      EXPECT_EQ(client.ReadReply().status, 400) << name;
+    }
+    HttpClient client(port());
+    EXPECT_EQ(client.Call("/test.v1.Test/Echo", "hi", name + ": fine ~!\r\n").status, 200);
+  }
+}
+
+std::string ChunkedHead() {
+  return "POST /test.v1.Test/Echo HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+         "application/grpc-web+proto\r\nTransfer-Encoding: chunked\r\n\r\n";
+}
+
+TEST_F(GatewayTest, ChunkedRequestsAreTaken) {
+  HttpClient client(port());
+  client.Send(ChunkedHead());
+  for (const char byte : std::string("\0\0\0\0\x02hi", 7)) {
+    client.Send(std::string("1;note=small\r\n") + byte + "\r\n");
+  }
+  client.Send("0\r\nX-Trailer: kept to itself\r\n\r\n");
+  EXPECT_EQ(SplitFrames(client.ReadReply().body)[0].payload, "hi");
+}
+
+// 64 KiB in one trailer used to throw through the gateway's thread.
+TEST_F(GatewayTest, TrailersAndChunkHeadsHaveTheHeadsLimit) {
+  const std::string endless(1 << 16, 'x');
+  for (const auto& rest : std::vector<std::string>
+       {"0\r\nX: " + endless + "\r\n\r\n", "1;" + endless, "0\r\n" + endless, endless}) {
+    HttpClient client(port());
+    client.Send(ChunkedHead() + rest);
+    const int status = client.ReadReply().status;
+    EXPECT_TRUE(status == 431 || status == 400) << status;
+    EXPECT_TRUE(client.ClosedWithin(seconds(5)));
+  }
+  EXPECT_EQ(HttpClient(port()).Get("/").status, 200);
+}
+
 TEST_F(GatewayTest, ForeignHostsOriginsAndMethodsAreRefused) {
   HttpClient client(port());
   client.Send("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n");
@@ -198,7 +267,7 @@ TEST_F(GatewayTest, StopEndsStreamsPromptly) {
   EXPECT_TRUE(Eventually([&] { return service_.open_calls == 0; }));
 }
 
-TEST_F(GatewayTest, ConnectionsAboveTheLimitAreClosed) {
+TEST_F(GatewayTest, AtTheLimitWhoeverIsIdleLongestGivesWay) {
   GatewayOptions options;
   options.max_connections = 2;
   StartWith(options);
@@ -207,8 +276,23 @@ TEST_F(GatewayTest, ConnectionsAboveTheLimitAreClosed) {
   EXPECT_EQ(first.Get("/").status, 200);
   EXPECT_EQ(second.Get("/").status, 200);
   HttpClient third(port());
+  EXPECT_EQ(third.Get("/").status, 200);
+  EXPECT_TRUE(first.ClosedWithin(seconds(3)));
+  EXPECT_EQ(second.Get("/").status, 200);
+}
+
+TEST_F(GatewayTest, AtTheLimitWhoIsBeingAnsweredStays) {
+  GatewayOptions options;
+  options.max_connections = 2;
+  StartWith(options);
+  HttpClient first(port());
+  first.SendCall("/test.v1.Test/Silent", "");
+  HttpClient second(port());
+  second.SendCall("/test.v1.Test/Silent", "");
+  ASSERT_TRUE(Eventually([&] { return service_.open_calls == 2; }));
+  HttpClient third(port());
   EXPECT_TRUE(third.ClosedWithin(seconds(3)));
-  EXPECT_EQ(first.Get("/").status, 200);
+  EXPECT_EQ(service_.open_calls, 2);
 }
 
 TEST(GatewayStart, BadOptionsAndTakenPortsAreNamed) {

@@ -86,6 +86,41 @@ TEST_F(GazeArbiterTest, TheWearerTakesOverFromAnybodyAndGivesBack) {
   EXPECT_EQ(arbiter_.Override(kBob, true, 7100 * kMs).code(), absl::StatusCode::kPermissionDenied);
 }
 
+// A wearer who was gone used to hold the head for ever, and to have it back from the next.
+TEST_F(GazeArbiterTest, AWearerWhoIsGoneLosesTheHead) {
+  bool present = true;
+  arbiter_.SetPresence([&](const std::string& id) { return present && id == "w"; });
+  ASSERT_TRUE(arbiter_.Override(kWearer, true, 0).ok());
+  arbiter_.Tick(3'600'000 * kMs);
+  EXPECT_EQ(Pilot(), "Wilma") << "his page is open";
+  present = false;
+  arbiter_.Tick(3'609'000 * kMs);
+  EXPECT_EQ(Pilot(), "Wilma") << "his page may be loading again";
+  Acquire(kAnn, 3'609'000 * kMs);
+  arbiter_.Tick(3'611'000 * kMs);
+  EXPECT_EQ(Pilot(), "Ann");
+  EXPECT_EQ(arbiter_.last_words(), "Wilma vanished; Ann pilots");
+}
+
+TEST_F(GazeArbiterTest, ANewWearerDoesNotGiveTheHeadBackToTheOldOne) {
+  const GazeCaller ghost{{"g", "Ghost"}, true};
+  ASSERT_TRUE(arbiter_.Override(ghost, true, 0).ok());
+  ASSERT_TRUE(arbiter_.Override(kWearer, true, 1000 * kMs).ok());
+  ASSERT_TRUE(arbiter_.Override(kWearer, false, 2000 * kMs).ok());
+  EXPECT_EQ(Pilot(), "");
+}
+
+TEST_F(GazeArbiterTest, TheQueueIsBounded) {
+  Acquire(kAnn, 0);
+  absl::Status last;
+  for (int i = 0; i < 40; ++i) {
+    const std::string id = "q" + std::to_string(i);
+    last = arbiter_.Acquire({{id, id}, false}, "", kMs).status();
+  }
+  EXPECT_EQ(last.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(arbiter_.queue(), SizeIs(16));
+}
+
 TEST_F(GazeArbiterTest, PauseStopsEverybodyWithoutTakingTheLease) {
   Acquire(kAnn, 0);
   EXPECT_EQ(arbiter_.Pause(kAnn, true).code(), absl::StatusCode::kPermissionDenied);

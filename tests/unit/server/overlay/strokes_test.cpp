@@ -82,12 +82,13 @@ TEST_F(StrokesTest, UntrustedIsHollowInWordsAndUnknownPlacesAreNotDrawn) {
   EXPECT_THAT(Draw(note).strokes, IsEmpty());
 }
 
-TEST_F(StrokesTest, LongTextsAreShortenedAtACharacter) {
+TEST_F(StrokesTest, LabelsHaveAllOfTheText) {
   Annotation note = At({0, 0, 1}, AnnotationShape::kNote);
-  for (int i = 0; i < 50; ++i) note.text += "ö";
-  std::string expected;
-  for (int i = 0; i < 39; ++i) expected += "ö";
-  EXPECT_EQ(Draw(note).labels.at(0).text, expected + "…");
+  for (int i = 0; i < 250; ++i) note.text += "ö";
+  EXPECT_EQ(Draw(note).labels.at(0).text, note.text);
+  note.anchor.state = AnchorState::kPaused;
+  EXPECT_EQ(Draw(note).labels.at(0).words, note.text);
+  EXPECT_EQ(Draw(note).labels.at(0).text, note.text + ": do not trust");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/pipeline/busy.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade {
@@ -48,35 +49,110 @@ TEST(SessionTable, UnknownAndMalformedIdsDiffer) {
   EXPECT_FALSE(sessions.Join(request).ok());
 }
 
-TEST(SessionTable, IsBoundedAndForgetsTheUnusedFirst) {
-  SessionTable sessions(3);
-  const std::string first = sessions.Join({})->id;
-  const std::string second = sessions.Join({})->id;
-  ASSERT_TRUE(sessions.Join({}).ok());
-  EXPECT_TRUE(sessions.Find(first).ok());
-  ASSERT_TRUE(sessions.Join({}).ok());
-  EXPECT_TRUE(sessions.Find(first).ok());
-  EXPECT_FALSE(sessions.Find(second).ok());
+constexpr Timestamp kSecond = 1'000'000'000;
+constexpr Timestamp kMinute = 60 * kSecond;
+
+// A thousand joins used to put out an expert at work.
+TEST(SessionTable, WhoWorksIsNeverPutOutByWhoJoins) {
+  SessionTable sessions({.max_sessions = 3});
+  const std::string working = sessions.Join({}, 0)->id;
+  const std::string watching = sessions.Join({}, 0)->id;
+  const std::shared_ptr<void> stream = sessions.Hold(watching);
+  ASSERT_TRUE(sessions.Find(working, kSecond).ok());
+  for (int i = 0; i < 1000; ++i) {
+    const Timestamp now_ns = 2 * kSecond + i * kSecond / 10;
+    const absl::Status joined = sessions.Join({}, now_ns).status();
+    if (joined.ok()) continue;
+    EXPECT_EQ(joined.code(), absl::StatusCode::kResourceExhausted);
+    EXPECT_TRUE(RetryInfoOf(joined).has_value());
+  }
+  EXPECT_TRUE(sessions.Find(working, 103 * kSecond).ok());
+  EXPECT_TRUE(sessions.Find(watching, 103 * kSecond).ok());
+}
+
+TEST(SessionTable, TheUnusedGoFirstThenThoseLongSilent) {
+  SessionTable sessions({.max_sessions = 3});
+  const std::string old = sessions.Join({}, 0)->id;
+  ASSERT_TRUE(sessions.Find(old, kSecond).ok());
+  const std::string unused = sessions.Join({}, 11 * kMinute)->id;
+  ASSERT_TRUE(sessions.Join({}, 12 * kMinute).ok());
+  ASSERT_TRUE(sessions.Join({}, 12 * kMinute).ok()) << "instead of the unused one";
+  EXPECT_TRUE(sessions.Find(old, 1).ok());
+  EXPECT_FALSE(sessions.Find(unused, 12 * kMinute).ok());
+  ASSERT_TRUE(sessions.Join({}, 12 * kMinute + 1).ok()) << "instead of the silent one";
+  EXPECT_FALSE(sessions.Find(old, 12 * kMinute).ok());
+  EXPECT_FALSE(sessions.Join({}, 12 * kMinute + 2).ok()) << "the others have just come";
+}
+
+TEST(SessionTable, AStreamThatEndedKeepsItsSessionForAWhile) {
+  SessionTable sessions({.max_sessions = 1, .unused_ns = 0, .idle_ns = 0});
+  const std::string id = sessions.Join({})->id;
+  std::shared_ptr<void> stream = sessions.Hold(id);
+  EXPECT_FALSE(sessions.Join({}).ok());
+  stream = nullptr;
+  EXPECT_TRUE(sessions.Join({}).ok());
+  EXPECT_EQ(sessions.Hold(id), nullptr);
 }
 
 TEST(SessionTable, TellsWhoIsGoneAndTellsItAgainUntilItIsTaken) {
   std::vector<std::string> told;
   bool takes = false;
-  SessionTable sessions(2, [&](const std::string& id) {
-    told.push_back(id);
-    return takes;
-  });
-  const std::string first = sessions.Join({})->id;
-  const std::string second = sessions.Join({})->id;
+  SessionTable sessions({.max_sessions = 2, .unused_ns = 0, .idle_ns = 0},
+                        [&](const std::string& id) {
+                          told.push_back(id);
+                          return takes;
+                        });
+  const auto join_and_use = [&] {
+    const absl::StatusOr<Session> session = sessions.Join({});
+    EXPECT_TRUE(sessions.Find(session->id).ok());
+    return session->participant_id;
+  };
+  const std::string first = join_and_use();
+  const std::string second = join_and_use();
   EXPECT_TRUE(told.empty());
-  ASSERT_TRUE(sessions.Join({}).ok());
+  join_and_use();
   EXPECT_THAT(told, ::testing::ElementsAre(first));
   takes = true;
-  ASSERT_TRUE(sessions.Join({}).ok());
+  join_and_use();
   EXPECT_THAT(told, ::testing::ElementsAre(first, first, second));
   const std::size_t so_far = told.size();
-  ASSERT_TRUE(sessions.Join({}).ok());
+  join_and_use();
   EXPECT_EQ(told.size(), so_far + 1) << "what was taken is not told again";
+}
+
+TEST(SessionTable, ASessionCanBeGoneOnWith) {
+  SessionTable sessions;
+  v1::JoinRequest request;
+  request.set_display_name("Ann");
+  const Session ann = *sessions.Join(request);
+  EXPECT_NE(ann.id, ann.participant_id);
+  request.set_resume_session_id(ann.id);
+  request.set_display_name("Ann B");
+  const Session again = *sessions.Join(request);
+  EXPECT_EQ(again.id, ann.id);
+  EXPECT_EQ(again.participant_id, ann.participant_id);
+  EXPECT_EQ(sessions.Find(ann.id)->display_name, "Ann B");
+  // Neither what others know nor what nobody knows leads there.
+  request.set_resume_session_id(ann.participant_id);
+  EXPECT_NE(sessions.Join(request)->id, ann.id);
+  request.set_resume_session_id("not a UUID");
+  EXPECT_FALSE(sessions.Join(request).ok());
+}
+
+TEST(SessionTable, NamesAreOneLineThatTurnsNothingAbout) {
+  SessionTable sessions;
+  v1::JoinRequest request;
+  for (const char* name : {"Ann\n2026-11-29T00:00:00Z rpc Delete", "a\rb", "\x1b[2J",
+                           "a\xe2\x80\xaez", "a\xe2\x80\xa8z", "a\xe2\x81\xa6z", "a\xc2\x85z"}) {
+    request.set_display_name(name);
+    EXPECT_THAT(std::string(sessions.Join(request).status().message()),
+                ::testing::StartsWith("display_name: "));
+  }
+  for (const char* name :
+       {"J\xc3\xbcrgen", "\xd7\x93\xd7\xa0\xd7\x94", "\xf0\x9f\x94\xa7 Zo\xc3\xab"}) {
+    request.set_display_name(name);
+    EXPECT_TRUE(sessions.Join(request).ok()) << name;
+  }
 }
 
 }  // namespace

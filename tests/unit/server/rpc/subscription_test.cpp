@@ -128,6 +128,56 @@ TEST(Subscription, OnlyTheTopicsAskedFor) {
   EXPECT_FALSE(subscription.WantsKeyFrame(1));
 }
 
+// Frame `id` measured feature 5 at {10 + id, 20}, sought 6 at {30, 40.5} in vain, did not try 7 in
+// view.
+std::shared_ptr<const VideoPacket> PacketWithFeatures(FrameId id, bool key_frame) {
+  auto packet = std::make_shared<VideoPacket>(*MakePacket(id, key_frame));
+  auto snapshot = std::make_shared<MapSnapshot>(*packet->tracked.snapshot);
+  snapshot->features.resize(3);
+  for (std::size_t i = 0; i < 3; ++i) snapshot->features[i].id = 5 + i;
+  snapshot->features[0].state = FeatureState::kMeasured;
+  snapshot->features[0].pixel = Eigen::Vector2d(10.0 + static_cast<double>(id), 20.0);
+  snapshot->features[1].state = FeatureState::kFailed;
+  snapshot->features[1].pixel = Eigen::Vector2d(30.0, 40.5);
+  snapshot->features[2].pixel = Eigen::Vector2d(50.0, 60.0);
+  packet->tracked.snapshot = snapshot;
+  return packet;
+}
+
+TEST(Subscription, APictureSaysWhatItsOwnFrameMeasured) {
+  Subscription subscription(Everything());
+  for (const FrameId id : {FrameId{0}, FrameId{1}}) {
+    // The newest frame is further on than the picture, as while coding: it must not matter.
+    subscription.Offer(MakeTracked(id + 7));
+    subscription.Offer(PacketWithFeatures(id, id == 0));
+    int pictures = 0;
+    for (const v1::Event& event : Drain(subscription)) {
+      if (!event.has_access_unit()) continue;
+      ++pictures;
+      const v1::AccessUnit& unit = event.access_unit();
+      ASSERT_EQ(unit.frame_id(), id);
+      ASSERT_TRUE(unit.has_features());
+      EXPECT_THAT(unit.features().measured_ids(), ::testing::ElementsAre(5));
+      EXPECT_THAT(unit.features().measured_px16(),
+                  ::testing::ElementsAre(160 + 16 * static_cast<int>(id), 320));
+      EXPECT_THAT(unit.features().failed_ids(), ::testing::ElementsAre(6));
+      EXPECT_THAT(unit.features().failed_px16(), ::testing::ElementsAre(480, 648));
+    }
+    EXPECT_EQ(pictures, 1);
+  }
+}
+
+TEST(Subscription, WithoutTheMapAPictureCarriesNoFeatures) {
+  SubscriptionOptions options;
+  options.topics.set(v1::TOPIC_VIDEO);
+  options.window = 32;
+  Subscription subscription(options);
+  subscription.Offer(PacketWithFeatures(0, true));
+  const std::vector<v1::Event> events = Drain(subscription);
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_FALSE(events[0].access_unit().has_features());
+}
+
 TEST(SubscriptionOptions, BadRequestsNameTheField) {
   v1::SubscribeRequest request;
   request.set_window(1000);
