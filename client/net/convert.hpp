@@ -23,7 +23,19 @@ absl::StatusOr<std::vector<Annotation>> FromProto(
     const google::protobuf::RepeatedPtrField<v1::Annotation>& messages);
 absl::StatusOr<AnnotationChange> FromProto(const v1::AnnotationEvent& message);
 
-/// Nothing for the kinds that Watch() does not deliver.
+/// Puts together what the server sends in parts. One thread.
+class AnnotationParts {
+ public:
+  /// The whole change with its last part (`more` false); nothing until then. A full one begins
+  /// anew.
+  std::optional<AnnotationChange> Add(AnnotationChange part, bool more);
+
+ private:
+  std::optional<AnnotationChange> so_far_;
+};
+
+/// Nothing for the kinds that Watch() does not deliver. Annotations are as in the message: maybe a
+/// part.
 absl::StatusOr<std::optional<WatchEvent>> FromProto(const v1::Event& message);
 
 }  // namespace saccade::net

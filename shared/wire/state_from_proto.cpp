@@ -212,6 +212,29 @@ absl::StatusOr<FeatureSnapshot> FromProto(const v1::Feature& message, absl::stri
   return out;
 }
 
+absl::StatusOr<Anchor> FromProto(const v1::Anchor& message, absl::string_view field) {
+  Anchor out;
+  absl::StatusOr<AnchorState> state =
+      AnchorStateFromProto(message.state(), absl::StrCat(field, ".state"));
+  if (!state.ok()) return state.status();
+  out.state = *state;
+  out.method = AnchorMethodFromProto(message.method());
+  out.place_known = message.has_point_in_world_m();
+  absl::StatusOr<Eigen::Vector3d> point =
+      FromProto(message.point_in_world_m(), absl::StrCat(field, ".point_in_world_m"));
+  if (!point.ok()) return point.status();
+  out.point_in_world = *point;
+  absl::StatusOr<Eigen::Matrix3d> covariance =
+      FromProto(message.covariance_in_world_m2(), absl::StrCat(field, ".covariance_in_world_m2"));
+  if (!covariance.ok()) return covariance.status();
+  out.covariance_in_world = *covariance;
+  out.error_m = message.error_mm() * 1e-3;
+  if (message.has_error_px()) out.error_px = message.error_px();
+  if (message.has_pixel()) out.pixel = Eigen::Vector2d(message.pixel().u(), message.pixel().v());
+  out.reason = message.reason();
+  return out;
+}
+
 absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string_view field) {
   Annotation out;
   out.id = message.id();
@@ -234,27 +257,9 @@ absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string
   out.color_rgba = message.color_rgba();
   out.created_unix_ns = message.created_unix_ns();
   out.revision = message.revision();
-  const v1::Anchor& anchor = message.anchor();
-  absl::StatusOr<AnchorState> state =
-      AnchorStateFromProto(anchor.state(), absl::StrCat(field, ".anchor.state"));
-  if (!state.ok()) return state.status();
-  out.anchor.state = *state;
-  out.anchor.method = AnchorMethodFromProto(anchor.method());
-  out.anchor.place_known = anchor.has_point_in_world_m();
-  absl::StatusOr<Eigen::Vector3d> point =
-      FromProto(anchor.point_in_world_m(), absl::StrCat(field, ".anchor.point_in_world_m"));
-  if (!point.ok()) return point.status();
-  out.anchor.point_in_world = *point;
-  absl::StatusOr<Eigen::Matrix3d> covariance = FromProto(
-      anchor.covariance_in_world_m2(), absl::StrCat(field, ".anchor.covariance_in_world_m2"));
-  if (!covariance.ok()) return covariance.status();
-  out.anchor.covariance_in_world = *covariance;
-  out.anchor.error_m = anchor.error_mm() * 1e-3;
-  if (anchor.has_error_px()) out.anchor.error_px = anchor.error_px();
-  if (anchor.has_pixel()) {
-    out.anchor.pixel = Eigen::Vector2d(anchor.pixel().u(), anchor.pixel().v());
-  }
-  out.anchor.reason = anchor.reason();
+  absl::StatusOr<Anchor> anchor = FromProto(message.anchor(), absl::StrCat(field, ".anchor"));
+  if (!anchor.ok()) return anchor.status();
+  out.anchor = *std::move(anchor);
   for (const v1::Vector3& offset : message.ink_offset_m()) {
     absl::StatusOr<Eigen::Vector3d> one = FromProto(offset, absl::StrCat(field, ".ink_offset_m"));
     if (!one.ok()) return one.status();
