@@ -51,7 +51,7 @@ class StatePrinter {
     mode_ = state.mode;
     arrived_ = state.arrived;
     problem_ = state.problem;
-    std::cout << (json_ ? ToJson(state).dump() : StateText(state)) << std::endl;
+    std::cout << (json_ ? Dump(ToJson(state)) : StateText(state)) << std::endl;
   }
 
  private:
