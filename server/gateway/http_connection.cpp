@@ -26,7 +26,7 @@ using boost::system::error_code;
 
 constexpr std::size_t kMaxHeadBytes = 16 * 1024;
 // What may come while we answer: the next requests of a client that pipelines.
-constexpr std::size_t kMaxPipelinedBytes = 64 * 1024;
+constexpr std::size_t kMaxPipelinedBytes = 512 * 1024;
 // Everything from us, nothing inline, nothing framed: the page needs no more.
 constexpr char kContentSecurityPolicy[] =
     "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; "
