@@ -74,7 +74,8 @@ absl::Status AnchorManager::Place(const AnnotationTarget& target,
   if (record.annotation.shape == AnnotationShape::kInk && !ink_px.empty()) {
     record.annotation.ink_offset_m = ProjectInk(ink_px, *resolved);
   }
-  Estimate(record);
+  int selections_left = 1;
+  Estimate(record, selections_left);
   return absl::OkStatus();
 }
 
@@ -244,7 +245,8 @@ AnchorRecord AnchorManager::Restore(const PastState& past, const AnchorRecord* l
   } else if (past.place) {
     record.place = *past.place;
   }
-  if (newest_) Estimate(record);
+  int selections_left = 1;
+  if (newest_) Estimate(record, selections_left);
   return record;
 }
 

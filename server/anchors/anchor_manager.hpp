@@ -108,8 +108,10 @@ class AnchorManager {
   AnchorRecord* Find(const std::string& id);
   absl::Status CheckReady() const;
   bool Attach(AnchorRecord& record) const;
-  void Estimate(AnchorRecord& record) const;
-  std::optional<AnchorMoved> ResolveOne(bool map_corrected, AnchorRecord& record) const;
+  /// `selections_left`: see Follow. Attaching a place counts as one too.
+  void Estimate(AnchorRecord& record, int& selections_left) const;
+  std::optional<AnchorMoved> ResolveOne(bool map_corrected, AnchorRecord& record,
+                                        int& selections_left) const;
   void Publish();
 
   AnchorOptions options_;

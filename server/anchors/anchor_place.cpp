@@ -115,13 +115,18 @@ bool IsSeen(const MapView& map, const AnchorPlace& place) {
 
 /// Adds the features that carry the anchor best now. New members enter with no residual, so nothing
 /// moves in this frame.
-void Replenish(const MapView& map, const AnchorOptions& options, AnchorPlace& place) {
+void Replenish(const MapView& map, const AnchorOptions& options, AnchorPlace& place,
+               int& selections_left) {
   const Timestamp now_ns = map.snapshot().capture_time_ns;
   const bool full = place.members.size() >= static_cast<std::size_t>(options.cluster_size);
   // Members stay in the map when they leave the filter: choices out of sight, or later ones, would
   // only take over what the map is wrong by at that moment.
   const bool settled = place.was_tracking && (place.seen_s > kSettled_s || !IsSeen(map, place));
-  if (full && (settled || std::abs(now_ns - place.last_selected_ns) < kReselectNs)) return;
+  if (full && (settled || selections_left <= 0 ||
+               std::abs(now_ns - place.last_selected_ns) < kReselectNs)) {
+    return;
+  }
+  --selections_left;
   place.last_selected_ns = now_ns;
   const Rigid3 binding_from_world = place.world_from_binding.Inverse();
   bool changed = false;
@@ -234,14 +239,15 @@ const FeatureSnapshot* MapView::Find(FeatureId id) const {
   return found == by_id_.end() ? nullptr : found->second;
 }
 
-PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place) {
+PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place,
+                     int& selections_left) {
   const Timestamp now_ns = map.snapshot().capture_time_ns;
   const double dt =
       place.last_time_ns == 0 ? 0 : std::max(0.0, Seconds(now_ns - place.last_time_ns));
   place.last_time_ns = now_ns;
   DropLostMembers(map, place);
   place.world_from_binding = FitMembers(map, place);
-  Replenish(map, options, place);
+  Replenish(map, options, place, selections_left);
   for (ClusterMember& member : place.members) {
     member.last_in_world = map.Find(member.id)->point_in_world;
   }

@@ -77,7 +77,9 @@ struct PlaceEstimate {
 /// Carries `place` to this frame: fits the members' motion, replaces those that the map dropped
 /// without moving the point, and takes over the seeded feature's better depth gradually. A place
 /// without members (a new one) hangs itself on the nearest features with known depth; where there
-/// are none it stays where it is in world.
-PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place);
+/// are none it stays where it is in world. `selections_left`: how often the whole map may still be
+/// searched in this frame for better company than a place has; counted down.
+PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place,
+                     int& selections_left);
 
 }  // namespace saccade

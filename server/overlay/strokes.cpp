@@ -4,6 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "server/overlay/ink_thinner.hpp"
+
 namespace saccade {
 namespace {
 
@@ -100,11 +102,14 @@ std::vector<Polyline3> ShapeLines(const Annotation& annotation) {
 Marks AnnotationMarks(const CameraModel& camera, const Rigid3& world_from_camera,
                       const std::vector<Annotation>& annotations) {
   const Rigid3 camera_from_world = world_from_camera.Inverse();
+  const InkThinner thinner(camera, camera_from_world, annotations);
   Marks marks;
   for (const Annotation& annotation : annotations) {
     if (!IsDrawable(annotation)) continue;
     const bool hollow = annotation.anchor.state == AnchorState::kPaused;
-    for (const Polyline3& line : ShapeLines(annotation)) {
+    const bool ink = annotation.shape == AnnotationShape::kInk;
+    for (const Polyline3& line :
+         ink ? std::vector<Polyline3>{thinner.Thin(annotation)} : ShapeLines(annotation)) {
       for (Polyline2& piece : ProjectPolyline(camera, camera_from_world, line)) {
         marks.strokes.push_back({annotation.id, annotation.color_rgba, hollow, std::move(piece)});
       }

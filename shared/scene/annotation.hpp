@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -76,24 +77,38 @@ class InkStroke {
 
   InkStroke() = default;
   InkStroke(Points points)  // NOLINT(google-explicit-constructor): a list of points is a stroke
-      : points_(points.empty() ? nullptr : std::make_shared<const Points>(std::move(points))) {}
+      : made_(points.empty() ? nullptr : std::make_shared<const Made>(std::move(points))) {}
   InkStroke(std::initializer_list<Eigen::Vector3d> points) : InkStroke(Points(points)) {}
 
-  bool empty() const { return points_ == nullptr; }
-  std::size_t size() const { return empty() ? 0 : points_->size(); }
-  const Eigen::Vector3d* begin() const { return empty() ? nullptr : points_->data(); }
+  bool empty() const { return made_ == nullptr; }
+  std::size_t size() const { return empty() ? 0 : made_->points.size(); }
+  const Eigen::Vector3d* begin() const { return empty() ? nullptr : made_->points.data(); }
   const Eigen::Vector3d* end() const { return begin() + size(); }
-  const Eigen::Vector3d& operator[](std::size_t i) const { return (*points_)[i]; }
+  const Eigen::Vector3d& operator[](std::size_t i) const { return made_->points[i]; }
   std::size_t bytes() const { return size() * sizeof(Eigen::Vector3d); }
 
+  /// Distance of its farthest point from the anchor, and its length along all points [m].
+  double radius_m() const { return empty() ? 0.0 : made_->radius_m; }
+  double length_m() const { return empty() ? 0.0 : made_->length_m; }
+
   /// Equal for copies of one stroke, and for them alone.
-  const void* identity() const { return points_.get(); }
+  const void* identity() const { return made_.get(); }
   friend bool operator==(const InkStroke& a, const InkStroke& b) {
-    return a.points_ == b.points_ || (!a.empty() && !b.empty() && *a.points_ == *b.points_);
+    return a.made_ == b.made_ || (!a.empty() && !b.empty() && a.made_->points == b.made_->points);
   }
 
  private:
-  std::shared_ptr<const Points> points_;  // null: no point
+  struct Made {
+    explicit Made(Points given) : points(std::move(given)) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        radius_m = std::max(radius_m, points[i].norm());
+        if (i > 0) length_m += (points[i] - points[i - 1]).norm();
+      }
+    }
+    const Points points;
+    double radius_m = 0.0, length_m = 0.0;
+  };
+  std::shared_ptr<const Made> made_;  // null: no point
 };
 
 struct Annotation {

@@ -49,8 +49,8 @@ class MovingTexture final : public FrameSource {
 
 class ScriptedTracker final : public FrameTracker {
  public:
-  explicit ScriptedTracker(std::function<void()> before_frame)
-      : before_frame_(std::move(before_frame)) {}
+  explicit ScriptedTracker(const InProcessOptions& options)
+      : before_frame_(options.before_frame), lively_(options.lively_features) {}
 
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override {
     before_frame_();
@@ -76,6 +76,12 @@ class ScriptedTracker final : public FrameTracker {
       feature.matched_count = 50;
       snapshot->features.push_back(feature);
     }
+    for (int i = 0; i < lively_; ++i) {
+      FeatureSnapshot feature = snapshot->features[static_cast<std::size_t>(i) % 20];
+      feature.id = static_cast<FeatureId>(1000 + i);
+      feature.point_in_world.x() += 0.002 * static_cast<double>(frame.id % 10) + 0.01 * i;
+      snapshot->features.push_back(feature);
+    }
     return snapshot;
   }
   void Reset() override { ++generation_; }
@@ -86,6 +92,7 @@ class ScriptedTracker final : public FrameTracker {
 
  private:
   const std::function<void()> before_frame_;
+  const int lively_;
   std::uint64_t generation_ = 0;
 };
 
@@ -105,9 +112,9 @@ InProcessServer::InProcessServer(const InProcessOptions& options) {
   engine_options.version = "test";
   engine_options.mailbox = options.mailbox;
   engine_options.mount = options.mount;
-  engine_ = Must(Engine::Create(engine_options, std::make_unique<MovingTexture>(options),
-                                std::make_unique<ScriptedTracker>(options.before_frame),
-                                std::move(store), hub_));
+  engine_ =
+      Must(Engine::Create(engine_options, std::make_unique<MovingTexture>(options),
+                          std::make_unique<ScriptedTracker>(options), std::move(store), hub_));
   hub_.Connect(engine_.get());
   RpcServerOptions rpc_options;
   rpc_options.port = 0;

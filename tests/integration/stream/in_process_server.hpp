@@ -20,6 +20,9 @@ struct InProcessOptions {
   std::size_t mailbox = 64;
   SessionTableOptions sessions;
   std::shared_ptr<Mount> mount;  // null: none
+  /// Features that change in every frame, beside the 20 that stand still: so many a map of a desk
+  /// sends anew.
+  int lively_features = 0;
   /// Runs on the tracker thread before each frame.
   std::function<void()> before_frame = [] {};
 };
