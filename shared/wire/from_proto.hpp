@@ -56,7 +56,7 @@ absl::Status CheckUuid(absl::string_view id, absl::string_view field);
 // What a client reads from the server.
 absl::StatusOr<MapSnapshot> FromProto(const v1::PoseEvent& message, absl::string_view field);
 absl::StatusOr<FeatureSnapshot> FromProto(const v1::Feature& message, absl::string_view field);
-absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string_view field);
 absl::StatusOr<Anchor> FromProto(const v1::Anchor& message, absl::string_view field);
+absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string_view field);
 
 }  // namespace saccade::wire
