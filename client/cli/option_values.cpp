@@ -41,6 +41,17 @@ absl::StatusOr<std::uint32_t> ParseColor(absl::string_view text) {
   return (rgb << 8) | 0xffu;
 }
 
+CLI::Validator Number(double least, double most) {
+  return CLI::Validator(
+      [least, most](std::string& text) {
+        double number = 0;
+        return absl::SimpleAtod(text, &number) && number >= least && number <= most
+                   ? std::string()
+                   : absl::StrCat("'", text, "' is not a number from ", least, " to ", most);
+      },
+      "");
+}
+
 CLI::Validator Id() {
   return CLI::Validator(
       [](std::string& text) {

@@ -11,6 +11,9 @@ namespace saccade::cli {
 /// RRGGBB, as on the page, to 0xRRGGBBff.
 absl::StatusOr<std::uint32_t> ParseColor(absl::string_view text);
 
+/// As CLI::Range, which lets NaN through: no comparison with it holds.
+CLI::Validator Number(double least, double most);
+
 /// Digits alone: a sign or a dot would be read as another number.
 CLI::Validator Id();
 

@@ -58,6 +58,5 @@ absl::StatusOr<MapSnapshot> FromProto(const v1::PoseEvent& message, absl::string
 absl::StatusOr<FeatureSnapshot> FromProto(const v1::Feature& message, absl::string_view field);
 absl::StatusOr<Anchor> FromProto(const v1::Anchor& message, absl::string_view field);
 absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string_view field);
-absl::StatusOr<Anchor> FromProto(const v1::Anchor& message, absl::string_view field);
 
 }  // namespace saccade::wire
