@@ -67,6 +67,18 @@ CLI::Validator Checked(Parse parse, const std::string& form) {
       form);
 }
 
+// As CLI::Range, which lets NaN through: no comparison with it holds.
+CLI::Validator Number(double least, double most) {
+  return CLI::Validator(
+      [least, most](std::string& text) {
+        double number = 0;
+        return absl::SimpleAtod(text, &number) && number >= least && number <= most
+                   ? std::string()
+                   : absl::StrCat("'", text, "' is not a number from ", least, " to ", most);
+      },
+      "");
+}
+
 // Digits alone: a sign or a dot would be read as another number.
 CLI::Validator Id() {
   return CLI::Validator(
@@ -84,7 +96,7 @@ void AddMapAndPictures(CLI::App& app, Options& options, Raw& raw) {
   CLI::App* watch =
       app.add_subcommand("watch", "Follow it: a line a second, or each event as JSON");
   watch->add_option("--for", options.watch_s, "End after so many seconds")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(Number(0.001, 1e9));
   CLI::App* map = app.add_subcommand("map", "The map's features");
   map->add_option("--out", options.out, "Write it to this file as PLY (x y z in metres, colour)");
   CLI::App* snapshot = app.add_subcommand("snapshot", "One picture as PNG");
@@ -116,7 +128,7 @@ void AddAnnotate(CLI::App& app, Options& options, Raw& raw) {
       ->capture_default_str();
   annotate->add_option("--text", options.draft.text, "Text, at most 500 bytes");
   annotate->add_option("--size", options.draft.size_m, "Size [m]")
-      ->check(CLI::Range(0.001, 10.0))
+      ->check(Number(0.001, 10.0))
       ->capture_default_str();
   annotate->add_option("--color", raw.color, "RRGGBB, for example ff9a3d (else white)")
       ->check(Checked(ParseColor, "RRGGBB"));
@@ -151,12 +163,12 @@ void AddGaze(CLI::App& app, Options& options, Raw& raw) {
   feature->excludes(point);
   fixate->add_flag("--fast", options.fast, "As fast as the mount can, instead of 30 deg/s");
   fixate->add_option("--for", options.gaze_s, "Let go after so many seconds")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(Number(0.001, 1e9));
   app.add_subcommand("stop", "Stop the camera where it is");
   app.add_subcommand("release", "Let the camera go");
   CLI::App* home = app.add_subcommand("home", "Turn the camera straight ahead");
   home->add_option("--for", options.gaze_s, "Give up after so many seconds (20)")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(Number(0.001, 1e9));
 }
 
 void AddCalibrateMount(CLI::App& app, Options& options) {
@@ -263,7 +275,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   app.add_option("--server", options.connection.server, "HOST:PORT of the server's gRPC address")
       ->capture_default_str();
   app.add_option("--timeout", raw.timeout_s, "Seconds to wait for an answer")
-      ->check(CLI::Range(0.05, 3600.0))
+      ->check(Number(0.05, 3600.0))
       ->capture_default_str();
   app.add_option("--name", options.connection.display_name, "Your name, as the others see it")
       ->capture_default_str();

@@ -8,6 +8,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "shared/io/regular_file.hpp"
+
 namespace saccade::cli {
 namespace fs = std::filesystem;
 
@@ -28,10 +30,11 @@ std::string SessionFilePath(const std::string& server) {
 }
 
 std::string LoadSession(const std::string& server) {
-  std::ifstream in(SessionFilePath(server));
-  std::string id;
-  in >> id;
-  return id.size() == 36 ? id : "";
+  const absl::StatusOr<std::string> text =
+      ReadRegularFile(SessionFilePath(server), 4096, "a session id");
+  if (!text.ok()) return "";
+  const absl::string_view id = absl::StripAsciiWhitespace(*text);
+  return id.size() == 36 ? std::string(id) : "";
 }
 
 void SaveSession(const std::string& server, const std::string& session_id) {

@@ -1,9 +1,11 @@
 #include "server/app/gaze_runner.hpp"
 
-#include <cstdio>
+#include <absl/strings/str_cat.h>
+
 #include <utility>
 
 #include "server/anchors/edit_checks.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -99,7 +101,7 @@ void GazeRunner::Run(std::stop_token stop) {
       next = std::chrono::steady_clock::now() + kStep;
     }
     for (const Handover& change : loop_.TakeHandovers()) {
-      std::fprintf(stderr, "gaze: %s\n", change.words.c_str());
+      Log(absl::StrCat("gaze: ", change.words));
       now = true;
     }
     Tell(now);

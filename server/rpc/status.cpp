@@ -4,7 +4,7 @@
 #include <absl/time/clock.h>
 #include <absl/time/time.h>
 
-#include <cstdio>
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -54,8 +54,9 @@ grpc::Status ToGrpc(const absl::Status& status) {
 void Audit(const char* method, const std::string& session_id, const absl::Status& status) {
   const std::string time =
       absl::FormatTime("%Y-%m-%dT%H:%M:%E3SZ", absl::Now(), absl::UTCTimeZone());
-  std::fprintf(stderr, "%s rpc %s session=%.36s %s\n", time.c_str(), method, session_id.c_str(),
-               status.ok() ? "ok" : status.ToString().c_str());
+  Log(absl::StrCat(time, " rpc ", Printable(method),
+                   " session=", Printable(session_id.substr(0, 36)), " ",
+                   status.ok() ? "ok" : Printable(status.ToString())));
 }
 
 }  // namespace saccade
