@@ -1,3 +1,5 @@
+#include <signal.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -50,6 +52,7 @@ absl::Status RunWithSession(cli::Options& options) {
 int main(int argc, char** argv) {
   // gRPC's own words for what is said below in one line; whoever wants them sets the variable.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
+  signal(SIGINT, SIG_DFL);  // a shell starts what is in the background deaf to it
   cli::ParseResult parsed = cli::ParseCommandLine(argc, argv);
   if (!parsed.options) return parsed.exit_code;
   cli::Options& options = *parsed.options;

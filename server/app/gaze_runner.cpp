@@ -1,11 +1,13 @@
 #include "server/app/gaze_runner.hpp"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
 #include "server/anchors/edit_checks.hpp"
 #include "server/pipeline/busy.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -117,7 +119,7 @@ void GazeRunner::Run(std::stop_token stop) {
       next = std::chrono::steady_clock::now() + kStep;
     }
     for (const Handover& change : loop_.TakeHandovers()) {
-      std::fprintf(stderr, "gaze: %s\n", change.words.c_str());
+      Log(absl::StrCat("gaze: ", change.words));
       changed = true;
     }
     Tell(changed);
