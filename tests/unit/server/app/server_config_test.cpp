@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <fstream>
@@ -33,7 +34,8 @@ std::string Error(const std::vector<std::string>& arguments) {
 
 // A file in the test's own folder.
 std::string Toml(const std::string& text) {
-  const std::string path = ::testing::TempDir() + "/saccade_config_test.toml";
+  const std::string path =
+      ::testing::TempDir() + "/saccade_config_test_" + std::to_string(getpid()) + ".toml";
   std::ofstream(path) << text;
   return path;
 }

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <string>
@@ -19,7 +20,8 @@ std::string Times(int count, const std::string& text) {
 }
 
 absl::StatusOr<toml::value> Parse(const std::string& text) {
-  const std::string file = ::testing::TempDir() + "/saccade_toml_file_test.toml";
+  const std::string file =
+      ::testing::TempDir() + "/saccade_toml_file_test_" + std::to_string(getpid()) + ".toml";
   std::ofstream(file, std::ios::binary) << text;
   return ParseTomlFile(file);
 }
