@@ -2,6 +2,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <iostream>
 
 #include "client/cli/commands.hpp"
@@ -10,35 +11,49 @@
 namespace saccade::cli {
 namespace {
 
-std::string Line(const Annotation& annotation) {
-  const Anchor& anchor = annotation.anchor;
-  return absl::StrCat(Word(annotation.shape), " ", annotation.id, ": ", Word(anchor.state), ", ",
-                      ErrorText(anchor), anchor.place_known ? ", " + PlaceText(anchor) : "");
+// A map without a target has no metres; only the pose says so.
+absl::StatusOr<bool> IsMetric(net::Connection& connection) {
+  const absl::StatusOr<net::ServerStatus> status = connection.GetStatus();
+  if (!status.ok()) return status.status();
+  return status->pose.metric;
 }
 
-std::string FullText(const Annotation& annotation) {
+std::string Line(const Annotation& annotation, bool metric) {
+  const Anchor& anchor = annotation.anchor;
+  return absl::StrCat(Word(annotation.shape), " ", annotation.id, ": ", StateText(anchor), ", ",
+                      ErrorText(anchor, metric),
+                      anchor.place_known ? ", " + PlaceText(anchor) : "");
+}
+
+std::string FullText(const Annotation& annotation, bool metric) {
   const Anchor& anchor = annotation.anchor;
   return Table(
       {{"id", annotation.id},
-       {"shape", absl::StrFormat("%s, %.3f m", Word(annotation.shape), annotation.size_m)},
+       {"shape", absl::StrFormat("%s, %.3f%s", Word(annotation.shape), annotation.size_m,
+                                 metric ? " m" : ", scale unknown")},
        {"text", annotation.text.empty() ? "(none)" : annotation.text},
        {"author", annotation.author},
        {"revision", absl::StrCat(annotation.revision)},
-       {"state",
-        absl::StrCat(Word(anchor.state), anchor.reason.empty() ? "" : ": ", anchor.reason)},
-       {"error", ErrorText(anchor)},
+       {"state", absl::StrCat(StateText(anchor), anchor.reason.empty() ? "" : ": ", anchor.reason)},
+       {"error", ErrorText(anchor, metric)},
        {"point", absl::StrCat(PlaceText(anchor), ", by ", Word(anchor.method))},
        {"pixel", anchor.pixel ? absl::StrFormat("%.1f,%.1f", anchor.pixel->x(), anchor.pixel->y())
                               : "out of view"}});
 }
 
-std::string ListText(const std::vector<Annotation>& annotations) {
+// A table has a line for each, however many its text has.
+std::string OneLine(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+std::string ListText(const std::vector<Annotation>& annotations, bool metric) {
   if (annotations.empty()) return "no annotations\n";
   std::vector<std::vector<std::string>> rows = {{"id", "shape", "state", "error", "text"}};
   for (const Annotation& annotation : annotations) {
     rows.push_back({annotation.id, std::string(Word(annotation.shape)),
-                    std::string(Word(annotation.anchor.state)), ErrorText(annotation.anchor),
-                    annotation.text});
+                    StateText(annotation.anchor), ErrorText(annotation.anchor, metric),
+                    OneLine(annotation.text)});
   }
   return Table(rows);
 }
@@ -78,7 +93,10 @@ absl::Status RunAnnotate(const Options& options, net::Connection& connection) {
   }
   const absl::StatusOr<Annotation> annotation = connection.CreateAnnotation(std::move(draft));
   if (!annotation.ok()) return annotation.status();
-  std::cout << (options.json ? ToJson(*annotation).dump(2) : Line(*annotation)) << "\n";
+  const absl::StatusOr<bool> metric = IsMetric(connection);
+  if (!metric.ok()) return metric.status();
+  std::cout << (options.json ? Dump(ToJson(*annotation, *metric), 2) : Line(*annotation, *metric))
+            << "\n";
   return absl::OkStatus();
 }
 
@@ -88,29 +106,32 @@ absl::Status RunAnnotations(const Options& options, net::Connection& connection)
     const absl::StatusOr<std::string> done = undo ? connection.Undo() : connection.Redo();
     if (!done.ok()) return done.status();
     if (options.json) {
-      std::cout << nlohmann::json{{undo ? "undone" : "redone", *done}}.dump() << "\n";
+      std::cout << Dump({{undo ? "undone" : "redone", *done}}) << "\n";
     } else {
       std::cout << *done << "\n";
     }
     return absl::OkStatus();
   }
+  const absl::StatusOr<bool> metric = IsMetric(connection);
+  if (!metric.ok()) return metric.status();
   if (options.command == Command::kListAnnotations) {
     const absl::StatusOr<std::vector<Annotation>> all = connection.ListAnnotations();
     if (!all.ok()) return all.status();
-    std::cout << (options.json ? ToJson(*all).dump(2) + "\n" : ListText(*all));
+    std::cout << (options.json ? Dump(ToJson(*all, *metric), 2) + "\n" : ListText(*all, *metric));
     return absl::OkStatus();
   }
   const absl::StatusOr<Annotation> annotation = Find(connection, options.id);
   if (!annotation.ok()) return annotation.status();
   if (options.command == Command::kShowAnnotation) {
-    std::cout << (options.json ? ToJson(*annotation).dump(2) + "\n" : FullText(*annotation));
+    std::cout << (options.json ? Dump(ToJson(*annotation, *metric), 2) + "\n"
+                               : FullText(*annotation, *metric));
     return absl::OkStatus();
   }
   if (absl::Status deleted = connection.DeleteAnnotation(annotation->id); !deleted.ok()) {
     return deleted;
   }
   if (options.json) {
-    std::cout << nlohmann::json{{"deleted", annotation->id}}.dump() << "\n";
+    std::cout << Dump({{"deleted", annotation->id}}) << "\n";
   } else {
     std::cout << "deleted " << annotation->id << "\n";
   }

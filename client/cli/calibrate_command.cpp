@@ -15,7 +15,13 @@ namespace {
 // The server gives the head up 500 ms after the last heartbeat: whoever interrupts this stops it.
 constexpr std::chrono::milliseconds kHeartbeat(100);
 
-absl::StatusOr<MountCalibrationReport> Wait(net::Connection& connection,
+// Progress goes to stderr, as JSON where answers are.
+void SayProgress(const Options& options, int tenths) {
+  std::cerr << (options.json ? Dump({{"calibrating", 0.1 * tenths}}) + "\n"
+                             : absl::StrFormat("calibrating: %d %%\n", 10 * tenths));
+}
+
+absl::StatusOr<MountCalibrationReport> Wait(const Options& options, net::Connection& connection,
                                             const std::string& lease_id) {
   int said = -1;
   while (true) {
@@ -24,7 +30,7 @@ absl::StatusOr<MountCalibrationReport> Wait(net::Connection& connection,
     absl::StatusOr<MountCalibrationReport> report = connection.GetMountCalibration();
     if (!report.ok() || !report->running) return report;
     const int tenths = static_cast<int>(10 * report->share);
-    if (tenths != said) std::cerr << absl::StrFormat("calibrating: %d %%\n", 10 * tenths);
+    if (tenths != said) SayProgress(options, tenths);
     said = tenths;
     std::this_thread::sleep_for(kHeartbeat);
   }
@@ -37,7 +43,7 @@ absl::Status Show(const Options& options, const MountCalibrationReport& report) 
     if (absl::Status written = WriteFile(options.out, file); !written.ok()) return written;
   }
   if (options.json) {
-    std::cout << ToJson(report).dump() << "\n";
+    std::cout << Dump(ToJson(report)) << "\n";
     return absl::OkStatus();
   }
   std::cout << CalibrationText(report);
@@ -65,7 +71,7 @@ absl::Status RunCalibrateMount(const Options& options, net::Connection& connecti
     connection.ReleaseLease().IgnoreError();
     return begun.status();
   }
-  const absl::StatusOr<MountCalibrationReport> report = Wait(connection, *lease);
+  const absl::StatusOr<MountCalibrationReport> report = Wait(options, connection, *lease);
   connection.ReleaseLease().IgnoreError();
   if (!report.ok()) return report.status();
   return Show(options, *report);

@@ -75,9 +75,10 @@ std::string MapText(const net::MapState& map) {
                     PointText(feature.point_in_world, false), absl::StrFormat("%.4f", sigma),
                     absl::StrCat(feature.matched_count)});
   }
-  return absl::StrFormat("%d features at frame %d, generation %d, revision %d, %s\n%s",
-                         map.features.size(), map.frame_id, map.generation, map.revision,
-                         map.metric ? "metric" : "scale unknown", Table(rows));
+  return absl::StrFormat("%d features%s at frame %d, generation %d, revision %d, %s\n%s",
+                         map.features.size(), map.complete ? "" : " (a part of all)", map.frame_id,
+                         map.generation, map.revision, map.metric ? "metric" : "scale unknown",
+                         Table(rows));
 }
 
 // One line a second.
@@ -86,14 +87,12 @@ class WatchPrinter {
   explicit WatchPrinter(bool json) : json_(json) {}
 
   void Print(const net::WatchEvent& event) {
+    if (const auto* pose = std::get_if<MapSnapshot>(&event)) pose_ = *pose;
     if (json_) {
-      std::cout << ToJson(event).dump() << std::endl;
+      std::cout << Dump(ToJson(event, pose_.metric)) << std::endl;
       return;
     }
-    if (const auto* pose = std::get_if<MapSnapshot>(&event)) {
-      pose_ = *pose;
-      ++poses_;
-    } else if (const auto* statistics = std::get_if<net::Statistics>(&event)) {
+    if (const auto* statistics = std::get_if<net::Statistics>(&event)) {
       PrintLine(*statistics);
     } else if (const auto* change = std::get_if<net::AnnotationChange>(&event)) {
       // Anchors move with each frame; what is worth a line is what comes and goes.
@@ -115,7 +114,6 @@ class WatchPrinter {
   }
 
   bool json_;
-  int poses_ = 0;
   MapSnapshot pose_;
 };
 
@@ -124,7 +122,7 @@ class WatchPrinter {
 absl::Status RunStatus(const Options& options, net::Connection& connection) {
   const absl::StatusOr<net::ServerStatus> status = connection.GetStatus();
   if (!status.ok()) return status.status();
-  std::cout << (options.json ? ToJson(*status).dump(2) + "\n" : StatusText(*status));
+  std::cout << (options.json ? Dump(ToJson(*status), 2) + "\n" : StatusText(*status));
   return absl::OkStatus();
 }
 
@@ -142,15 +140,14 @@ absl::Status RunMap(const Options& options, net::Connection& connection) {
   if (options.out.empty()) {
     const absl::StatusOr<net::MapState> map = connection.GetMap();
     if (!map.ok()) return map.status();
-    std::cout << (options.json ? ToJson(*map).dump(2) + "\n" : MapText(*map));
+    std::cout << (options.json ? Dump(ToJson(*map), 2) + "\n" : MapText(*map));
     return absl::OkStatus();
   }
   const absl::StatusOr<net::MapExport> exported = connection.ExportMap();
   if (!exported.ok()) return exported.status();
   if (absl::Status written = WriteFile(options.out, exported->data); !written.ok()) return written;
   if (options.json) {
-    std::cout << nlohmann::json{{"out", options.out}, {"features", exported->feature_count}}.dump()
-              << "\n";
+    std::cout << Dump({{"out", options.out}, {"features", exported->feature_count}}) << "\n";
   } else {
     std::cout << absl::StrFormat("%s: %d features\n", options.out, exported->feature_count);
   }
@@ -162,12 +159,12 @@ absl::Status RunSnapshot(const Options& options, net::Connection& connection) {
   if (!still.ok()) return still.status();
   if (absl::Status written = WriteFile(options.out, still->png); !written.ok()) return written;
   if (options.json) {
-    std::cout << nlohmann::json{{"out", options.out},
-                                {"frame_id", still->frame_id},
-                                {"width_px", still->intrinsics.width},
-                                {"height_px", still->intrinsics.height},
-                                {"pose", ToJson(still->pose)}}
-                     .dump()
+    const nlohmann::json pose = ToJson(still->pose);
+    std::cout << Dump({{"out", options.out},
+                       {"frame_id", pose["frame_id"]},
+                       {"width_px", still->intrinsics.width},
+                       {"height_px", still->intrinsics.height},
+                       {"pose", pose}})
               << "\n";
   } else {
     std::cout << absl::StrFormat("%s: frame %d, %d x %d, %s\n", options.out, still->frame_id,

@@ -1,8 +1,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <signal.h>
 
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -10,6 +8,7 @@
 #include <thread>
 
 #include "client/cli/commands.hpp"
+#include "client/cli/interrupt.hpp"
 #include "client/cli/text.hpp"
 
 namespace saccade::cli {
@@ -18,10 +17,6 @@ namespace {
 constexpr std::chrono::milliseconds kHeartbeat(100);  // the server waits 500 ms for one
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kHome_rad = 0.5 * kDegree;
-
-std::atomic<bool> interrupted = false;
-
-void OnInterrupt(int /*signal*/) { interrupted = true; }
 
 std::string StateText(const GazeSnapshot& state) {
   std::string text = ToString(state.mode);
@@ -51,7 +46,7 @@ class StatePrinter {
     mode_ = state.mode;
     arrived_ = state.arrived;
     problem_ = state.problem;
-    std::cout << (json_ ? ToJson(state).dump() : StateText(state)) << std::endl;
+    std::cout << (json_ ? Dump(ToJson(state)) : StateText(state)) << std::endl;
   }
 
  private:
@@ -75,7 +70,7 @@ absl::StatusOr<GazeSnapshot> Hold(net::Connection& connection, const std::string
     absl::StatusOr<GazeSnapshot> state = connection.GetGaze();
     if (!state.ok()) return state.status();
     printer.Print(*state);
-    if (done(*state) || interrupted) return state;
+    if (done(*state) || Interrupted()) return state;
     if (for_s > 0 && std::chrono::steady_clock::now() >= end) return state;
     std::this_thread::sleep_for(kHeartbeat);
   }
@@ -99,7 +94,7 @@ absl::Status RunFixate(const Options& options, net::Connection& connection) {
   if (!last.ok()) return last.status();
   const absl::Status released = connection.ReleaseLease();
   if (!released.ok()) return released;
-  if (arrived || interrupted || last->mode == GazeMode::kStopped) return absl::OkStatus();
+  if (arrived || Interrupted() || last->mode == GazeMode::kStopped) return absl::OkStatus();
   return absl::DeadlineExceededError(absl::StrCat("did not arrive: ", StateText(*last)));
 }
 
@@ -143,8 +138,7 @@ absl::StatusOr<std::string> TakeLease(net::Connection& connection) {
 }
 
 absl::Status RunGaze(const Options& options, net::Connection& connection) {
-  signal(SIGINT, OnInterrupt);
-  signal(SIGTERM, OnInterrupt);
+  HearInterrupts();
   switch (options.command) {
     case Command::kFixate:
       return RunFixate(options, connection);

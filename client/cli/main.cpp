@@ -1,3 +1,5 @@
+#include <signal.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -6,50 +8,64 @@
 
 #include "client/cli/commands.hpp"
 #include "client/cli/options.hpp"
+#include "client/cli/problem.hpp"
 #include "client/cli/session_file.hpp"
+#include "client/cli/text.hpp"
 #include "client/net/connection.hpp"
 
 namespace {
 
-int Fail(absl::string_view problem) {
+using namespace saccade;
+
+// One line on stderr, whatever came over the wire: stdout holds answers alone.
+int Fail(const cli::Options& options, const absl::Status& problem) {
   std::cout.flush();
-  // One line, whatever came over the wire.
-  std::string line(problem.substr(0, 2000));
-  for (char& c : line) {
-    if (c == '\n' || c == '\r') c = ' ';
+  const std::string text = cli::ProblemText(options, problem);
+  const std::string line =
+      options.json ? cli::Dump(cli::ProblemJson(problem.code(), text)) : "saccade: " + text;
+  std::fprintf(stderr, "%s\n", line.c_str());
+  return cli::kFailure;
+}
+
+absl::Status RunWithSession(cli::Options& options) {
+  net::ConnectionOptions& to = options.connection;
+  // Watching is a session of its own; editing goes on in the one of the last run.
+  const bool keeps_session = options.command != cli::Command::kWatch;
+  if (keeps_session) to.session_id = cli::LoadSession(to.server, to.display_name);
+  const auto connection = net::Connection::Create(to);
+  if (!connection.ok()) return connection.status();
+  // Who holds the camera wants to be able to stop it from another terminal.
+  if (options.command == cli::Command::kFixate) {
+    const absl::StatusOr<std::string> joined = (*connection)->Session();
+    if (joined.ok()) cli::SaveSession(to.server, to.display_name, *joined);
   }
-  std::fprintf(stderr, "saccade: %s\n", line.c_str());
-  return saccade::cli::kFailure;
+  const absl::Status status = cli::Run(options, **connection);
+  const std::string& session = (*connection)->session_id();
+  if (keeps_session && session != to.session_id) {
+    cli::SaveSession(to.server, to.display_name, session);
+  }
+  return status;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  using namespace saccade;
   // gRPC's own words for what is said below in one line; whoever wants them sets the variable.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
+  signal(SIGINT, SIG_DFL);  // a shell starts what is in the background deaf to it
   cli::ParseResult parsed = cli::ParseCommandLine(argc, argv);
   if (!parsed.options) return parsed.exit_code;
-  net::ConnectionOptions& options = parsed.options->connection;
-  // Watching is a session of its own; editing goes on in the one of the last run.
-  const bool keeps_session = parsed.options->command != cli::Command::kWatch;
+  cli::Options& options = *parsed.options;
   try {
-    if (keeps_session) options.session_id = cli::LoadSession(options.server);
-    const auto connection = net::Connection::Create(options);
-    if (!connection.ok()) return Fail(connection.status().message());
-    // Who holds the camera wants to be able to stop it from another terminal.
-    if (parsed.options->command == cli::Command::kFixate) {
-      const absl::StatusOr<std::string> joined = (*connection)->Session();
-      if (joined.ok()) cli::SaveSession(options.server, *joined);
-    }
-    const absl::Status status = cli::Run(*parsed.options, **connection);
-    const std::string& session = (*connection)->session_id();
-    if (keeps_session && session != options.session_id) cli::SaveSession(options.server, session);
-    if (!status.ok()) return Fail(status.message());
-  } catch (const std::exception& error) {  // e.g. text that is not UTF-8 meets JSON
-    return Fail(error.what());
+    const absl::Status status = RunWithSession(options);
+    if (!status.ok()) return Fail(options, status);
+  } catch (const std::exception& error) {
+    return Fail(options, absl::InternalError(error.what()));
   }
   std::cout.flush();
-  if (!std::cout) return Fail("cannot write to standard output; is the disk full?");
+  if (!std::cout) {
+    return Fail(options,
+                absl::UnavailableError("cannot write to standard output; is the disk full?"));
+  }
   return cli::kSuccess;
 }

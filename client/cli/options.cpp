@@ -1,16 +1,16 @@
 #include "client/cli/options.hpp"
 
-#include <absl/algorithm/container.h>
-#include <absl/strings/ascii.h>
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_split.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <map>
+
+#include "client/cli/option_values.hpp"
+#include "client/cli/problem.hpp"
+#include "client/cli/text.hpp"
 
 namespace saccade::cli {
 namespace {
@@ -33,29 +33,6 @@ const std::map<std::string, AnnotationShape>& Shapes() {
   return shapes;
 }
 
-absl::StatusOr<std::vector<double>> ParseList(absl::string_view text) {
-  std::vector<double> numbers;
-  for (const absl::string_view part : absl::StrSplit(text, ',')) {
-    double number = 0;
-    if (!absl::SimpleAtod(part, &number) || !std::isfinite(number)) {
-      return absl::InvalidArgumentError(absl::StrCat("'", part, "' is not a finite number"));
-    }
-    numbers.push_back(number);
-  }
-  return numbers;
-}
-
-// RRGGBB, as on the page, to 0xRRGGBBff.
-absl::StatusOr<std::uint32_t> ParseColor(absl::string_view text) {
-  std::uint32_t rgb = 0;
-  if (text.size() != 6 || !absl::c_all_of(text, absl::ascii_isxdigit) ||
-      !absl::SimpleHexAtoi(text, &rgb)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("'", text, "' is not a colour: RRGGBB, for example ff9a3d"));
-  }
-  return (rgb << 8) | 0xffu;
-}
-
 // A validator that leaves the text as it is.
 template <typename Parse>
 CLI::Validator Checked(Parse parse, const std::string& form) {
@@ -67,24 +44,12 @@ CLI::Validator Checked(Parse parse, const std::string& form) {
       form);
 }
 
-// Digits alone: a sign or a dot would be read as another number.
-CLI::Validator Id() {
-  return CLI::Validator(
-      [](std::string& text) {
-        std::uint64_t id = 0;
-        return absl::SimpleAtoi(text, &id) && text.find('-') == std::string::npos
-                   ? std::string()
-                   : absl::StrCat("'", text, "' is not an id (a whole number)");
-      },
-      "");
-}
-
 void AddMapAndPictures(CLI::App& app, Options& options, Raw& raw) {
   app.add_subcommand("status", "What the server is doing now");
   CLI::App* watch =
       app.add_subcommand("watch", "Follow it: a line a second, or each event as JSON");
   watch->add_option("--for", options.watch_s, "End after so many seconds")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(Number(0.001, 1e9));
   CLI::App* map = app.add_subcommand("map", "The map's features");
   map->add_option("--out", options.out, "Write it to this file as PLY (x y z in metres, colour)");
   CLI::App* snapshot = app.add_subcommand("snapshot", "One picture as PNG");
@@ -114,9 +79,9 @@ void AddAnnotate(CLI::App& app, Options& options, Raw& raw) {
   annotate->add_option("--shape", raw.shape, "cube, note, arrow or ink")
       ->check(CLI::IsMember({"cube", "note", "arrow", "ink"}))
       ->capture_default_str();
-  annotate->add_option("--text", options.draft.text, "Text, at most 500 bytes");
+  annotate->add_option("--text", options.draft.text, "Text, at most 500 bytes")->check(Utf8());
   annotate->add_option("--size", options.draft.size_m, "Size [m]")
-      ->check(CLI::Range(0.001, 10.0))
+      ->check(Number(0.001, 10.0))
       ->capture_default_str();
   annotate->add_option("--color", raw.color, "RRGGBB, for example ff9a3d (else white)")
       ->check(Checked(ParseColor, "RRGGBB"));
@@ -151,12 +116,12 @@ void AddGaze(CLI::App& app, Options& options, Raw& raw) {
   feature->excludes(point);
   fixate->add_flag("--fast", options.fast, "As fast as the mount can, instead of 30 deg/s");
   fixate->add_option("--for", options.gaze_s, "Let go after so many seconds")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(Number(0.001, 1e9));
   app.add_subcommand("stop", "Stop the camera where it is");
   app.add_subcommand("release", "Let the camera go");
   CLI::App* home = app.add_subcommand("home", "Turn the camera straight ahead");
   home->add_option("--for", options.gaze_s, "Give up after so many seconds (20)")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(Number(0.001, 1e9));
 }
 
 void AddCalibrateMount(CLI::App& app, Options& options) {
@@ -225,36 +190,24 @@ absl::StatusOr<GazeTarget> GazeOf(const Raw& raw) {
   return GazePoint{{xyz[0], xyz[1], xyz[2]}};
 }
 
-int Usage(absl::string_view problem) {
-  std::fprintf(stderr, "saccade: %s; see saccade --help\n", std::string(problem).c_str());
+// Whatever else is wrong with the command line, this is how its writer wants to be told.
+bool WantsJson(int argc, const char* const* argv) {
+  return std::any_of(argv, argv + argc,
+                     [](const char* word) { return std::string(word) == "--json"; });
+}
+
+int Usage(bool json, absl::string_view problem) {
+  const std::string text = absl::StrCat(problem, "; see saccade --help");
+  const std::string line =
+      json ? Dump(ProblemJson(absl::StatusCode::kInvalidArgument, text)) : "saccade: " + text;
+  std::fprintf(stderr, "%s\n", line.c_str());
   return kBadUsage;
 }
 
 }  // namespace
 
-absl::StatusOr<std::vector<double>> ParseNumbers(absl::string_view text, std::size_t count) {
-  absl::StatusOr<std::vector<double>> numbers = ParseList(text);
-  if (numbers.ok() && numbers->size() != count) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("'", text, "' has ", numbers->size(), " numbers, not ", count));
-  }
-  return numbers;
-}
-
-absl::StatusOr<std::vector<Eigen::Vector2d>> ParseStroke(absl::string_view text) {
-  const absl::StatusOr<std::vector<double>> numbers = ParseList(text);
-  if (!numbers.ok()) return numbers.status();
-  if (numbers->size() < 4 || numbers->size() % 2 != 0) {
-    return absl::InvalidArgumentError("a stroke is at least two pixels: U1,V1,U2,V2");
-  }
-  std::vector<Eigen::Vector2d> stroke;
-  for (std::size_t i = 0; i < numbers->size(); i += 2) {
-    stroke.emplace_back((*numbers)[i], (*numbers)[i + 1]);
-  }
-  return stroke;
-}
-
 ParseResult ParseCommandLine(int argc, const char* const* argv) {
+  const bool json = WantsJson(argc, argv);
   Options options;
   Raw raw;
   options.connection.display_name = "saccade";
@@ -263,11 +216,17 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   app.add_option("--server", options.connection.server, "HOST:PORT of the server's gRPC address")
       ->capture_default_str();
   app.add_option("--timeout", raw.timeout_s, "Seconds to wait for an answer")
-      ->check(CLI::Range(0.05, 3600.0))
+      ->check(Number(0.05, 3600.0))
       ->capture_default_str();
-  app.add_option("--name", options.connection.display_name, "Your name, as the others see it")
+  app.add_option("--name", options.connection.display_name,
+                 "Your name, as the others see it; each has its own undo")
+      ->check(Utf8())
       ->capture_default_str();
-  app.add_flag("--json", options.json, "Print JSON instead of text");
+  app.add_flag(
+      "--json", options.json,
+      "Print JSON instead of text: the answer on stdout, an error as "
+      "{\"error\": {\"code\", \"message\"}} on stderr; times in ns and integers above 2^53 "
+      "are strings");
   app.require_subcommand(1);
   app.fallthrough();
   AddMapAndPictures(app, options, raw);
@@ -281,25 +240,26 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return {std::nullopt, app.exit(error)};  // help and version
     if (app.get_subcommands().empty() && app.remaining_size() > 0) {
-      return {std::nullopt, Usage(absl::StrCat("there is no command '", app.remaining()[0], "'"))};
+      return {std::nullopt,
+              Usage(json, absl::StrCat("there is no command '", app.remaining()[0], "'"))};
     }
-    return {std::nullopt, Usage(error.what())};
+    return {std::nullopt, Usage(json, error.what())};
   }
   options.command = CommandOf(app);
   options.view = raw.view == "raw" ? net::VideoView::kRaw : net::VideoView::kAugmented;
   options.connection.deadline =
       std::chrono::milliseconds(static_cast<std::int64_t>(raw.timeout_s * 1000));
   if (absl::Status valid = options.connection.Validate(); !valid.ok()) {
-    return {std::nullopt, Usage(valid.message())};
+    return {std::nullopt, Usage(json, valid.message())};
   }
   if (options.command == Command::kFixate) {
     absl::StatusOr<GazeTarget> target = GazeOf(raw);
-    if (!target.ok()) return {std::nullopt, Usage(target.status().message())};
+    if (!target.ok()) return {std::nullopt, Usage(json, target.status().message())};
     options.gaze = *std::move(target);
   }
   if (options.command == Command::kAnnotate) {
     if (absl::Status done = FinishDraft(raw, options.draft); !done.ok()) {
-      return {std::nullopt, Usage(done.message())};
+      return {std::nullopt, Usage(json, done.message())};
     }
   }
   return {std::move(options), kSuccess};

@@ -24,6 +24,7 @@ namespace {
 constexpr int kMaxAnswerBytes = 64 << 20;  // a lossless picture of a large camera
 constexpr std::uint32_t kWindow = 32;      // events in flight unacknowledged
 constexpr std::uint64_t kAcknowledgeEvery = 8;
+constexpr int kMaxPages = 10000;  // of a list
 
 grpc::ChannelArguments ChannelArguments() {
   grpc::ChannelArguments arguments;
@@ -106,6 +107,7 @@ class Connection::Impl {
     v1::JoinRequest request;
     request.set_display_name(options_.display_name);
     request.set_role(ToProto(options_.role));
+    request.set_resume_session_id(options_.session_id);  // whose undo goes on, if it is known yet
     absl::StatusOr<v1::JoinResponse> response =
         Call(*session_, &v1::SessionService::Stub::Join, request);
     if (!response.ok()) return response.status();
@@ -161,14 +163,17 @@ class Connection::Impl {
     const std::unique_ptr<grpc::ClientReader<v1::Event>> reader =
         session_->Subscribe(&context, request);
     v1::Event message;
-    KnownStrokes strokes;
+    AnnotationParts parts;
     absl::Status failure;
     bool more = true;
     while (more && reader->Read(&message)) {
       if (message.sequence() % kAcknowledgeEvery == 0) Acknowledge(message.sequence());
-      if (message.has_annotation()) strokes.Complete(*message.mutable_annotation());
       absl::StatusOr<std::optional<WatchEvent>> event = FromProto(message);
       if (!event.ok()) failure = event.status();
+      if (event.ok() && message.has_annotation()) {
+        *event =
+            parts.Add(std::get<AnnotationChange>(**std::move(event)), message.annotation().more());
+      }
       more = event.ok() && (!event->has_value() || on_event(**event));
     }
     if (!more) context.TryCancel();
@@ -264,15 +269,18 @@ absl::StatusOr<Annotation> Connection::UpdateAnnotation(const AnnotationPatch& p
 absl::StatusOr<std::vector<Annotation>> Connection::ListAnnotations() {
   std::vector<Annotation> all;
   v1::ListAnnotationsRequest request;
-  do {
+  for (int page = 0; page < kMaxPages; ++page) {
     auto response = impl_->Call(*impl_->annotation_, &v1::AnnotationService::Stub::List, request);
     if (!response.ok()) return response.status();
-    absl::StatusOr<std::vector<Annotation>> page = FromProto(response->annotations());
-    if (!page.ok()) return page.status();
-    std::move(page->begin(), page->end(), std::back_inserter(all));
+    absl::StatusOr<std::vector<Annotation>> some = FromProto(response->annotations());
+    if (!some.ok()) return some.status();
+    std::move(some->begin(), some->end(), std::back_inserter(all));
+    if (response->next_page_token().empty()) return all;
+    if (response->next_page_token() == request.page_token()) break;
     request.set_page_token(response->next_page_token());
-  } while (!request.page_token().empty());
-  return all;
+  }
+  return absl::DataLossError(absl::StrCat("the list of annotations of ", impl_->options_.server,
+                                          " does not end; is it another version?"));
 }
 
 absl::Status Connection::DeleteAnnotation(const std::string& id) {

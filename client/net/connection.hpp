@@ -24,7 +24,8 @@ struct ConnectionOptions {
   /// Who the others see; at most 60 bytes.
   std::string display_name = "guest";
   Role role = Role::kExpert;
-  /// A session joined earlier; empty: join when a call first needs one.
+  /// A session joined earlier, to go on with; empty: join when a call first needs one. Secret: who
+  /// has it acts as you.
   std::string session_id;
 
   absl::Status Validate() const;
@@ -66,6 +67,7 @@ class Connection {
   /// `draft.request_id` is filled in if empty, so that a call made again creates nothing twice.
   absl::StatusOr<Annotation> CreateAnnotation(AnnotationDraft draft);
   absl::StatusOr<Annotation> UpdateAnnotation(const AnnotationPatch& patch);
+  /// Page by page until there are no more.
   absl::StatusOr<std::vector<Annotation>> ListAnnotations();
   absl::Status DeleteAnnotation(const std::string& id);
   /// What was undone or redone, in words. Acts on this session's own last change.
@@ -83,9 +85,9 @@ class Connection {
   GazeAnswer CalibrateMount();
   absl::StatusOr<MountCalibrationReport> GetMountCalibration();
 
-  /// Delivers poses, annotations, statistics and presence until `on_event` returns false (OK), the
-  /// server goes away (an error) or closes the stream (OK). Acknowledges as it reads, so that what
-  /// arrives is never older than the acknowledgement window.
+  /// Delivers poses, annotations (put together from their parts), statistics and presence until
+  /// `on_event` returns false (OK), the server goes away (an error) or closes the stream (OK).
+  /// Acknowledges as it reads, so that what arrives is never older than the acknowledgement window.
   absl::Status Watch(const std::function<bool(const WatchEvent&)>& on_event);
 
  private:

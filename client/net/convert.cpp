@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <iterator>
 #include <utility>
 
 #include "shared/wire/from_proto.hpp"
@@ -100,6 +101,7 @@ absl::StatusOr<MapState> FromProto(const v1::GetMapResponse& message) {
                  .revision = map.map_revision(),
                  .frame_id = map.frame_id(),
                  .metric = message.metric(),
+                 .complete = !map.more(),
                  .features = {}};
   for (int i = 0; i < map.upserted_size(); ++i) {
     absl::StatusOr<FeatureSnapshot> feature =
@@ -136,25 +138,33 @@ absl::StatusOr<std::vector<Annotation>> FromProto(
 absl::StatusOr<AnnotationChange> FromProto(const v1::AnnotationEvent& message) {
   absl::StatusOr<std::vector<Annotation>> upserted = FromProto(message.upserted());
   if (!upserted.ok()) return upserted.status();
-  return AnnotationChange{
+  AnnotationChange change{
       .full = message.full(),
       .upserted = *std::move(upserted),
-      .removed_ids = {message.removed_ids().begin(), message.removed_ids().end()}};
+      .removed_ids = {message.removed_ids().begin(), message.removed_ids().end()},
+      .anchors = {}};
+  for (int i = 0; i < message.anchors_size(); ++i) {
+    absl::StatusOr<Anchor> anchor =
+        wire::FromProto(message.anchors(i).anchor(), absl::StrCat("anchors[", i, "].anchor"));
+    if (!anchor.ok()) return anchor.status();
+    change.anchors.push_back({message.anchors(i).id(), *std::move(anchor)});
+  }
+  return change;
 }
 
-void KnownStrokes::Complete(v1::AnnotationEvent& event) {
-  if (event.full()) known_.clear();
-  for (const std::string& id : event.removed_ids()) known_.erase(id);
-  for (const v1::Annotation& annotation : event.upserted()) {
-    if (annotation.ink_offset_m_size() > 0) known_[annotation.id()] = annotation;
+std::optional<AnnotationChange> AnnotationParts::Add(AnnotationChange part, bool more) {
+  const auto append = [](auto& to, auto& from) {
+    to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  };
+  if (!so_far_ || part.full) {
+    so_far_ = std::move(part);
+  } else {
+    append(so_far_->upserted, part.upserted);
+    append(so_far_->removed_ids, part.removed_ids);
+    append(so_far_->anchors, part.anchors);
   }
-  for (v1::AnchorUpdate& update : *event.mutable_anchors()) {
-    const auto known = known_.find(update.id());
-    if (known == known_.end()) continue;
-    *known->second.mutable_anchor() = update.anchor();
-    *event.add_upserted() = known->second;
-  }
-  event.clear_anchors();
+  if (more) return std::nullopt;
+  return std::exchange(so_far_, std::nullopt);
 }
 
 absl::StatusOr<std::optional<WatchEvent>> FromProto(const v1::Event& message) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <absl/container/flat_hash_map.h>
 #include <absl/status/statusor.h>
 
 #include <optional>
@@ -26,17 +25,19 @@ absl::StatusOr<std::vector<Annotation>> FromProto(
     const google::protobuf::RepeatedPtrField<v1::Annotation>& messages);
 absl::StatusOr<AnnotationChange> FromProto(const v1::AnnotationEvent& message);
 
-/// The strokes of one subscription: an estimate that came without its stroke is completed by it.
-class KnownStrokes {
+/// Puts together what the server sends in parts. One thread.
+class AnnotationParts {
  public:
-  /// Turns `anchors` of the event into `upserted`; remembers strokes, forgets removed ones.
-  void Complete(v1::AnnotationEvent& event);
+  /// The whole change with its last part (`more` false); nothing until then. A full one begins
+  /// anew.
+  std::optional<AnnotationChange> Add(AnnotationChange part, bool more);
 
  private:
-  absl::flat_hash_map<std::string, v1::Annotation> known_;  // by id
+  std::optional<AnnotationChange> so_far_;
 };
 
-/// Nothing for the kinds that Watch() does not deliver.
+/// Nothing for the kinds that Watch() does not deliver. Annotations are as in the message: maybe a
+/// part.
 absl::StatusOr<std::optional<WatchEvent>> FromProto(const v1::Event& message);
 
 }  // namespace saccade::net

@@ -53,6 +53,7 @@ struct MapState {
   std::uint64_t revision = 0;
   FrameId frame_id = 0;
   bool metric = false;
+  bool complete = true;  // false: the server sent only a part of it
   std::vector<FeatureSnapshot> features;
 };
 
@@ -70,10 +71,17 @@ struct Still {
   MapSnapshot pose;  // without features
 };
 
+/// The live estimate of an annotation that is otherwise as before.
+struct AnchorUpdate {
+  std::string id;
+  Anchor anchor;
+};
+
 struct AnnotationChange {
   bool full = false;  // the first of a subscription: everything there is
   std::vector<Annotation> upserted;
   std::vector<std::string> removed_ids;
+  std::vector<AnchorUpdate> anchors;
 };
 
 /// Whether one may steer the camera.

@@ -29,22 +29,28 @@ absl::Status AnchorOptions::Validate() const {
                      : absl::InvalidArgumentError(
                            absl::StrCat("anchors.", name, " is 0; give a number above 0"));
   };
-  for (const absl::Status& status :
-       {some("max_annotations", max_annotations), some("max_ink_points", max_ink_points),
-        some("max_bytes", max_bytes), some("max_session_annotations", max_session_annotations),
-        some("max_session_ink_points", max_session_ink_points),
-        some("max_undo_bytes", max_undo_bytes), some("max_undo_bytes_all", max_undo_bytes_all),
-        positive("cluster_softening_m", cluster_softening_m),
-        positive("feature_radius_px", feature_radius_px),
-        positive("plane_residual_m", plane_residual_m),
-        positive("plane_residual_relative", plane_residual_relative),
-        positive("median_depth_sigma", median_depth_sigma),
-        positive("click_sigma_px", click_sigma_px), positive("tracking_sigma", tracking_sigma),
-        positive("pause_sigma_m", pause_sigma_m), positive("pause_sigma_px", pause_sigma_px),
-        positive("pause_sigma_no_scale", pause_sigma_no_scale),
-        positive("resume_share", resume_share), positive("resume_time_s", resume_time_s),
-        positive("far_depth_sigma", far_depth_sigma), positive("moved_m", moved_m),
-        positive("refine_time_s", refine_time_s)}) {
+  for (const absl::Status& status : {some("max_annotations", max_annotations),
+                                     some("max_ink_points", max_ink_points),
+                                     some("max_bytes", max_bytes),
+                                     some("max_session_annotations", max_session_annotations),
+                                     some("max_session_ink_points", max_session_ink_points),
+                                     some("max_undo_bytes", max_undo_bytes),
+                                     some("max_undo_bytes_all", max_undo_bytes_all),
+                                     positive("cluster_softening_m", cluster_softening_m),
+                                     positive("feature_radius_px", feature_radius_px),
+                                     positive("plane_residual_m", plane_residual_m),
+                                     positive("plane_residual_relative", plane_residual_relative),
+                                     positive("median_depth_sigma", median_depth_sigma),
+                                     positive("click_sigma_px", click_sigma_px),
+                                     positive("tracking_sigma", tracking_sigma),
+                                     positive("pause_sigma_m", pause_sigma_m),
+                                     positive("pause_sigma_px", pause_sigma_px),
+                                     positive("pause_sigma_no_scale", pause_sigma_no_scale),
+                                     positive("resume_share", resume_share),
+                                     positive("resume_time_s", resume_time_s),
+                                     positive("far_depth_sigma", far_depth_sigma),
+                                     positive("moved_m", moved_m),
+                                     positive("refine_time_s", refine_time_s)}) {
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

@@ -1,9 +1,9 @@
 #include "server/app/engine.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <condition_variable>
-#include <cstdio>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/app/crop_view.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -69,7 +70,7 @@ absl::StatusOr<std::unique_ptr<Engine>> Engine::Create(EngineOptions options,
              double depth_m, double sigma_m) {
         return self->tracker_->SeedFeature(frame, world_from_camera, pixel, depth_m, sigma_m);
       },
-      std::move(store));
+      std::move(store), [self] { self->inbox_.PutNewestIfEmpty({}); });
   if (!book.ok()) return book.status();
   engine->book_ = *std::move(book);
   return engine;
@@ -77,7 +78,10 @@ absl::StatusOr<std::unique_ptr<Engine>> Engine::Create(EngineOptions options,
 
 void Engine::Start() {
   if (gaze_) gaze_->Start();
-  tracker_thread_ = std::jthread([this](std::stop_token stop) { RunTracker(stop); });
+  tracker_thread_ = std::jthread([this](std::stop_token stop) {
+    pthread_setname_np(pthread_self(), "tracker");  // for debuggers, and the test that stops it
+    RunTracker(stop);
+  });
   source_thread_ = std::jthread([this](std::stop_token stop) { RunSource(stop); });
   clock_thread_ = std::jthread([this](std::stop_token stop) { RunClock(stop); });
 }
@@ -87,12 +91,13 @@ void Engine::Stop() {
   for (std::jthread* thread : {&source_thread_, &tracker_thread_, &clock_thread_}) {
     thread->request_stop();
   }
-  for (std::jthread* thread : {&source_thread_, &tracker_thread_, &clock_thread_}) {
-    if (thread->joinable()) thread->join();
-  }
-  if (gaze_) gaze_->Stop();
+  source_->Stop();           // its next frame may not be due for long
+  if (gaze_) gaze_->Stop();  // the head stops now, however long the frame takes that is tracked
   for (const Command& command : inbox_.Close()) {
     Fail(command, absl::UnavailableError("the server is shutting down"));
+  }
+  for (std::jthread* thread : {&source_thread_, &tracker_thread_, &clock_thread_}) {
+    if (thread->joinable()) thread->join();
   }
   stills_.Stop();
   for (const auto& view : views_) view->Stop();
@@ -100,11 +105,17 @@ void Engine::Stop() {
   book_ = nullptr;  // commits what is queued and answers it
 }
 
+absl::Status Engine::FlushStore(std::chrono::milliseconds limit) {
+  const std::unique_lock lock(book_gone_mutex_, limit);
+  if (!lock) return absl::UnavailableError("the data base is still being written");
+  return book_ ? book_->Flush(limit) : absl::OkStatus();
+}
+
 void Engine::RunSource(std::stop_token stop) {
   while (!stop.stop_requested()) {
     absl::StatusOr<std::optional<Frame>> frame = source_->Next();
     bad_frames_ = source_->bad_frames();
-    if (!frame.ok()) std::fprintf(stderr, "source: %s\n", frame.status().ToString().c_str());
+    if (!frame.ok()) Log(absl::StrCat("source: ", frame.status().ToString()));
     if (!frame.ok() || !frame->has_value()) break;
     captured_.Add(MonotonicNow(), 1.0);
     ++frames_;
@@ -150,8 +161,8 @@ void Engine::Track(Frame frame) {
   ring_.Push({shared, tracked.snapshot});
   last_ = std::move(next);
   for (const AnchorMoved& moved : book_->OnSnapshot(last_->tracked.snapshot, *shared->camera)) {
-    std::fprintf(stderr, "anchor %s moved %.1f mm: %s\n", moved.id.c_str(),
-                 1e3 * moved.delta_in_world.norm(), moved.cause.c_str());
+    Log(absl::StrFormat("anchor %s moved %.1f mm: %s", moved.id, 1e3 * moved.delta_in_world.norm(),
+                        moved.cause));
   }
   TellGaze(*shared);
   const Timestamp end_ns = MonotonicNow();
@@ -190,6 +201,7 @@ absl::Status Engine::SubmitGaze(GazeCommand command) {
 
 // Without a new frame: commands may have changed annotations, the store may have answered.
 void Engine::Settle() {
+  book_->Settle();  // also without a frame: stored annotations can be edited before the first
   if (!last_) return;
   book_->OnSnapshot(last_->tracked.snapshot, *last_->tracked.camera);
   const bool same = last_->tracked.annotations == book_->Latest() &&
@@ -280,11 +292,16 @@ void Engine::MakeStill(StillRequest request) {
   frame.tracked.camera = request.past.frame->camera;
   frame.tracked.annotations = book_->Latest();
   frame.tracked.stages.captured_ns = request.past.frame->received_time_ns;
-  const cv::Mat picture =
-      request.view == VideoView::kAugmented ? DrawAugmented(frame) : PictureOf(*frame.frame);
   std::vector<uchar> png;
-  // Level 1: a third of the time of the default for a tenth more bytes.
-  if (!cv::imencode(".png", picture, png, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
+  try {
+    const cv::Mat picture =
+        request.view == VideoView::kAugmented ? DrawAugmented(frame) : PictureOf(*frame.frame);
+    // Level 1: a third of the time of the default for a tenth more bytes.
+    cv::imencode(".png", picture, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  } catch (const std::exception&) {  // no memory, or what OpenCV will not draw: said below
+    png.clear();
+  }
+  if (png.empty()) {
     return request.done(absl::InternalError("the picture could not be coded as PNG"));
   }
   request.done(Still{std::make_shared<const std::string>(png.begin(), png.end()), frame.tracked});

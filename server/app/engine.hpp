@@ -4,7 +4,9 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -57,6 +59,9 @@ class Engine : public Backend {
   void Start();
   /// Ends the threads and answers every command. May be called twice.
   void Stop();
+  /// Waits until every change that was accepted is on disk, at most `limit`. Any thread, also while
+  /// Stop() waits for a frame.
+  absl::Status FlushStore(std::chrono::milliseconds limit);
 
   absl::Status Submit(Command command) override;
   const ServerFacts& facts() const override { return facts_; }
@@ -100,10 +105,10 @@ class Engine : public Backend {
   const EngineOptions options_;
   ServerFacts facts_;
   EventSink& sink_;
-  std::unique_ptr<FrameSource> source_;    // source thread
-  std::unique_ptr<FrameTracker> tracker_;  // tracker thread
-  std::unique_ptr<AnnotationBook> book_;   // tracker thread, but for Latest()
-  mutable std::mutex book_gone_mutex_;     // held to throw book_ away, and to read it elsewhere
+  std::unique_ptr<FrameSource> source_;       // source thread
+  std::unique_ptr<FrameTracker> tracker_;     // tracker thread
+  std::unique_ptr<AnnotationBook> book_;      // tracker thread, but for Latest()
+  mutable std::timed_mutex book_gone_mutex_;  // held to throw book_ away, and to read it elsewhere
   FrameRing ring_;
   Inbox<Input, Command> inbox_;
   std::array<std::unique_ptr<ViewEncoder>, kVideoViews> views_;

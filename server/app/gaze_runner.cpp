@@ -1,16 +1,21 @@
 #include "server/app/gaze_runner.hpp"
 
-#include <cstdio>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
 #include <utility>
 
 #include "server/anchors/edit_checks.hpp"
 #include "server/pipeline/busy.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr std::chrono::milliseconds kStep(10);
 constexpr Timestamp kTellEvery = 33'000'000;
+// What a command changed is told at once; of a flood of commands the sum.
+constexpr Timestamp kTellChangeEvery = 15'000'000;
 
 }  // namespace
 
@@ -89,10 +94,12 @@ GazeRunner::Work GazeRunner::WaitFor(std::chrono::steady_clock::time_point until
   return {std::exchange(commands_, {}), std::exchange(view_, std::nullopt)};
 }
 
-void GazeRunner::Tell(bool now) {
+void GazeRunner::Tell(bool changed) {
   const std::shared_ptr<const GazeSnapshot> state = loop_.snapshot();
-  if (!now && state->time_ns - told_ns_ < kTellEvery) return;
+  untold_ |= changed;
+  if (state->time_ns - told_ns_ < (untold_ ? kTellChangeEvery : kTellEvery)) return;
   told_ns_ = state->time_ns;
+  untold_ = false;
   publish_(state);
 }
 
@@ -102,17 +109,20 @@ void GazeRunner::Run(std::stop_token stop) {
     Work work = WaitFor(next, stop);
     if (work.view) loop_.OnView(*work.view);
     for (const Arrived& one : work.commands) loop_.Execute(one.command, one.time_ns);
-    bool now = !work.commands.empty();
+    bool changed = std::any_of(work.commands.begin(), work.commands.end(), [](const Arrived& one) {
+      // Whether the lease changed hands is in the handovers; places in the queue can wait.
+      return !std::holds_alternative<AcquireGazeLease>(one.command);
+    });
     // A command acts at once, not at the next step.
-    if (now || std::chrono::steady_clock::now() >= next) {
+    if (!work.commands.empty() || std::chrono::steady_clock::now() >= next) {
       loop_.Step(MonotonicNow());
       next = std::chrono::steady_clock::now() + kStep;
     }
     for (const Handover& change : loop_.TakeHandovers()) {
-      std::fprintf(stderr, "gaze: %s\n", change.words.c_str());
-      now = true;
+      Log(absl::StrCat("gaze: ", change.words));
+      changed = true;
     }
-    Tell(now);
+    Tell(changed);
   }
 }
 

@@ -52,13 +52,14 @@ class GazeRunner {
     std::optional<GazeView> view;
   };
   Work WaitFor(std::chrono::steady_clock::time_point until, std::stop_token stop);
-  void Tell(bool now);
+  void Tell(bool changed);
 
   const std::shared_ptr<Mount> mount_;
   const std::size_t mailbox_;
   const Publish publish_;
   GazeLoop loop_;  // gaze thread
   Timestamp told_ns_ = 0;
+  bool untold_ = false;  // a command changed something that nobody was told yet
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<Arrived> commands_;

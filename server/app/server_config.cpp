@@ -8,7 +8,8 @@
 #include <cstdlib>
 #include <iostream>
 #include <set>
-#include <toml.hpp>
+
+#include "shared/io/toml_file.hpp"
 
 namespace saccade {
 namespace {
@@ -43,6 +44,8 @@ void AddFlags(CLI::App& app, Raw& raw) {
   app.add_option("--sim-truth", raw.sim_truth, "JSON lines of the simulator's truth");
 }
 
+constexpr std::int64_t kMostRunFor_s = 1'000'000'000;  // 31 years
+
 absl::Status Bad(const std::string& what) { return absl::InvalidArgumentError(what); }
 
 // Takes `key` from `table` unless the flag was given; removes it from `left`.
@@ -56,8 +59,10 @@ void Take(const toml::value& table, const std::string& key, bool given, T& out,
 
 absl::Status ReadFile(const CLI::App& app, Raw& raw) {
   if (raw.config.empty()) return absl::OkStatus();
+  absl::StatusOr<toml::value> parsed = ParseTomlFile(raw.config);
+  if (!parsed.ok()) return Bad(absl::StrCat("--config: ", parsed.status().message()));
+  const toml::value& root = *parsed;
   try {
-    const toml::value root = toml::parse(raw.config);
     std::set<std::string> left;
     for (const auto& [key, value] : root.as_table()) left.insert(key);
     const auto given = [&app](const char* flag) { return app.count(flag) > 0; };
@@ -175,8 +180,10 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
     return Bad("--sim-truth: only a sim: source knows the truth");
   }
   config.sim_truth = raw.sim_truth;
-  if (raw.bit_rate < 0 || raw.bit_rate > 100'000'000) {
-    return Bad(absl::StrCat("video.bit_rate_bit_s: ", raw.bit_rate, ": 50000 to 100000000, or 0"));
+  // As VideoEncoderOptions has it: less is no picture.
+  if (raw.bit_rate != 0 && (raw.bit_rate < 50'000 || raw.bit_rate > 100'000'000)) {
+    return Bad(absl::StrCat("video.bit_rate_bit_s: ", raw.bit_rate,
+                            ": give 50000 to 100000000, or 0: by the size of the picture"));
   }
   config.video_bit_rate_bit_s = static_cast<int>(raw.bit_rate);
   if (!(raw.limits_scale >= 0 && raw.limits_scale <= 1000)) {
@@ -184,6 +191,7 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   }
   config.limits_scale = raw.limits_scale;
   config.web_root = raw.web_root;
+  if (raw.seed < 0) return Bad(absl::StrCat("seed: ", raw.seed, ": give a whole number from 0"));
   config.seed = static_cast<std::uint64_t>(raw.seed);
   config.config_file = raw.config;
   return config;
@@ -202,9 +210,11 @@ absl::StatusOr<std::optional<ServerConfig>> ServerConfig::FromCommandLine(int ar
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
     return Bad(absl::StrCat(error.what(), " (see --help)"));
+  } catch (const std::exception& error) {
+    return Bad(absl::StrCat("the command line cannot be read: ", error.what()));
   }
-  if (app.count("--run-for") > 0 && !(raw.run_for_s >= 0.0 && std::isfinite(raw.run_for_s))) {
-    return Bad("--run-for: seconds, 0 or more");
+  if (app.count("--run-for") > 0 && !(raw.run_for_s >= 0.0 && raw.run_for_s <= kMostRunFor_s)) {
+    return Bad(absl::StrCat("--run-for: ", raw.run_for_s, ": seconds, 0 to ", kMostRunFor_s));
   }
   if (absl::Status file = ReadFile(app, raw); !file.ok()) return file;
   absl::StatusOr<ServerConfig> config = Check(raw);

@@ -1,48 +1,29 @@
 // saccade-server: configuration, wiring, shutdown.
+#include <absl/cleanup/cleanup.h>
 #include <absl/status/status.h>
-#include <signal.h>
+#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <nlohmann/json.hpp>
 
 #include "server/app/engine.hpp"
 #include "server/app/open_source.hpp"
 #include "server/app/server_config.hpp"
+#include "server/app/shutdown.hpp"
 #include "server/app/slam_tracker.hpp"
+#include "server/app/view_encoder.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
 #include "server/store/annotation_store.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
-
-// Blocked in every thread, so that only WaitForEnd hears them.
-sigset_t BlockSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  signal(SIGPIPE, SIG_IGN);
-  return signals;
-}
-
-void WaitForEnd(const sigset_t& signals, const std::optional<double>& run_for_s) {
-  if (!run_for_s) {
-    int got = 0;
-    sigwait(&signals, &got);
-    return;
-  }
-  timespec rest{};
-  rest.tv_sec = static_cast<time_t>(*run_for_s);
-  rest.tv_nsec = static_cast<long>((*run_for_s - static_cast<double>(rest.tv_sec)) * 1e9);
-  sigtimedwait(&signals, nullptr, &rest);
-}
 
 std::filesystem::path WebRoot(const ServerConfig& config) {
   if (!config.web_root.empty()) return config.web_root;
@@ -53,9 +34,28 @@ std::filesystem::path WebRoot(const ServerConfig& config) {
   return SACCADE_WEB_ROOT;
 }
 
-absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, StreamHub& hub) {
+/// Whether pictures of this camera can be coded as asked for: else there would be no video, and
+/// nobody would know before they look.
+absl::Status CheckVideo(const ServerConfig& config, const OpenedSource& opened) {
+  const CameraIntrinsics& camera = opened.source->info().camera->intrinsics();
+  for (const CameraIntrinsics& view : {camera, opened.crop.value_or(camera)}) {
+    const auto encoder = VideoEncoder::Create(
+        VideoOptions(view.width, view.height, camera.fps, config.video_bit_rate_bit_s));
+    if (encoder.ok()) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        opened.source->info().uri, ": there would be no video: ", encoder.status().message(),
+        "; give smaller pictures, or leave "
+        "video.bit_rate_bit_s out"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, StreamHub& hub,
+                                                   Shutdown& shutdown) {
+  shutdown.SetPhase("opening the source");
   absl::StatusOr<OpenedSource> opened = OpenConfiguredSource(config);
   if (!opened.ok()) return opened.status();
+  if (absl::Status video = CheckVideo(config, *opened); !video.ok()) return video;
   SourceInfo info = opened->source->info();
   if (opened->mount && !opened->crop)
     info.mount = std::make_shared<const MountModel>(opened->mount->model());
@@ -74,6 +74,7 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
   }
   absl::StatusOr<std::unique_ptr<FrameTracker>> tracker = MakeSlamTracker(info, tracker_options);
   if (!tracker.ok()) return tracker.status();
+  shutdown.SetPhase("opening the data base");
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);
   if (!store.ok()) return store.status();
   options.version = kVersion;
@@ -89,8 +90,7 @@ void SayReady(const ServerConfig& config, int grpc_port, int http_port) {
   const nlohmann::ordered_json ready = {{"event", "ready"},
                                         {"grpc", config.grpc.ToString(grpc_port)},
                                         {"http", config.http.ToString(http_port)}};
-  std::printf("%s\n", ready.dump().c_str());
-  std::fflush(stdout);
+  Announce(ready.dump());
 }
 
 // One line, also where a library's own words have several.
@@ -100,15 +100,19 @@ void SayProblem(const absl::Status& problem) {
   line.erase(
       std::unique(line.begin(), line.end(), [](char a, char b) { return a == ' ' && b == ' '; }),
       line.end());
-  std::fprintf(stderr, "saccade-server: %s\n", line.c_str());
+  Log(absl::StrCat("saccade-server: ", line));
+  FlushLog(std::chrono::milliseconds(500));
 }
 
-absl::Status Serve(const ServerConfig& config) {
-  const sigset_t signals = BlockSignals();
+absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   RaiseDescriptorLimit();
   StreamHub hub;
-  absl::StatusOr<std::unique_ptr<Engine>> engine = MakeEngine(config, hub);
+  absl::StatusOr<std::unique_ptr<Engine>> engine = MakeEngine(config, hub, shutdown);
   if (!engine.ok()) return engine.status();
+  const absl::Cleanup no_commit = [&shutdown] { shutdown.SetCommit(nullptr); };
+  shutdown.SetCommit(
+      [&engine](std::chrono::milliseconds limit) { return (*engine)->FlushStore(limit); });
+  shutdown.SetPhase("opening the ports");
   hub.Connect(engine->get());
   RpcServerOptions rpc_options;
   rpc_options.host = config.grpc.host;
@@ -124,8 +128,9 @@ absl::Status Serve(const ServerConfig& config) {
       Gateway::Start(gateway_options, (*rpc)->InProcessChannel());
   if (!gateway.ok()) return gateway.status();
   (*engine)->Start();
+  shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());
-  WaitForEnd(signals, config.run_for_s);
+  shutdown.Wait(config.run_for_s);
   // Streams end first, then browsers, then the threads that answer commands, then calls.
   hub.CloseAll(absl::UnavailableError("the server is shutting down"));
   (*gateway)->Stop();
@@ -134,20 +139,32 @@ absl::Status Serve(const ServerConfig& config) {
   return absl::OkStatus();
 }
 
+int Main(int argc, char** argv) {
+  Shutdown& shutdown = Shutdown::Listen();
+  const auto config = ServerConfig::FromCommandLine(argc, argv);
+  if (!config.ok()) {
+    SayProblem(config.status());
+    return 2;
+  }
+  if (!config->has_value()) return 0;
+  NeverWaitForStandardStreams();
+  const absl::Status served = Serve(**config, shutdown);
+  // Whatever did not come to be because of the signal is no failure.
+  if (served.ok() || shutdown.requested()) return 0;
+  SayProblem(served);
+  return 1;
+}
+
 }  // namespace
 }  // namespace saccade
 
 int main(int argc, char** argv) {
   // gRPC's own words for what is said below in one line; whoever wants them sets the variable.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
-  const auto config = saccade::ServerConfig::FromCommandLine(argc, argv);
-  if (!config.ok()) {
-    saccade::SayProblem(config.status());
-    return 2;
+  try {
+    return saccade::Main(argc, argv);
+  } catch (const std::exception& error) {  // no memory, no thread
+    saccade::SayProblem(absl::InternalError(error.what()));
+    return 1;
   }
-  if (!config->has_value()) return 0;
-  const absl::Status served = saccade::Serve(**config);
-  if (served.ok()) return 0;
-  saccade::SayProblem(served);
-  return 1;
 }

@@ -1,6 +1,11 @@
 #include "server/app/view_encoder.hpp"
 
-#include <cstdio>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <exception>
+
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -9,6 +14,15 @@ constexpr Timestamp kKeyFrameInterval = 250'000'000;
 constexpr Timestamp kIdle = 250'000'000;  // no frame for so long: the source stands still
 
 }  // namespace
+
+VideoEncoderOptions VideoOptions(int width, int height, double fps_hz, int bit_rate_bit_s) {
+  VideoEncoderOptions options;
+  options.width = width;
+  options.height = height;
+  options.fps_hz = std::clamp(fps_hz, 1.0, 240.0);
+  options.bit_rate_bit_s = bit_rate_bit_s;
+  return options;
+}
 
 ViewEncoder::ViewEncoder(VideoView view, int bit_rate_bit_s, DrawView draw, EventSink& sink)
     : view_(view),
@@ -74,25 +88,28 @@ bool ViewEncoder::TakeKeyFrameRequest(Timestamp now_ns) {
 
 absl::Status ViewEncoder::Prepare(const cv::Mat& picture, const TrackedFrame& frame) {
   if (encoder_ != nullptr) return absl::OkStatus();
-  VideoEncoderOptions options;
-  options.width = picture.cols;
-  options.height = picture.rows;
-  options.fps_hz = frame.tracked.camera->intrinsics().fps;
-  options.bit_rate_bit_s = bit_rate_bit_s_;
-  absl::StatusOr<std::unique_ptr<VideoEncoder>> encoder = VideoEncoder::Create(options);
+  absl::StatusOr<std::unique_ptr<VideoEncoder>> encoder = VideoEncoder::Create(VideoOptions(
+      picture.cols, picture.rows, frame.tracked.camera->intrinsics().fps, bit_rate_bit_s_));
   if (!encoder.ok()) return encoder.status();
   encoder_ = *std::move(encoder);
   return absl::OkStatus();
 }
 
+absl::StatusOr<EncodedPicture> ViewEncoder::DrawAndCode(const TrackedFrame& frame) {
+  try {
+    const cv::Mat picture = draw_(frame);
+    if (absl::Status ready = Prepare(picture, frame); !ready.ok()) return ready;
+    return encoder_->Encode(picture, TakeKeyFrameRequest(MonotonicNow()));
+  } catch (const std::exception& error) {  // no memory, or what OpenCV will not draw
+    return absl::InternalError(error.what());
+  }
+}
+
 void ViewEncoder::Step(const TrackedFrame& frame) {
   const Timestamp begin_ns = MonotonicNow();
-  const cv::Mat picture = draw_(frame);
-  const absl::Status ready = Prepare(picture, frame);
-  const absl::StatusOr<EncodedPicture> coded =
-      ready.ok() ? encoder_->Encode(picture, TakeKeyFrameRequest(begin_ns)) : ready;
+  const absl::StatusOr<EncodedPicture> coded = DrawAndCode(frame);
   if (!coded.ok()) {
-    if (!failed_) std::fprintf(stderr, "video: %s\n", coded.status().ToString().c_str());
+    if (!failed_) Log(absl::StrCat("video: ", coded.status().ToString()));
     failed_ = true;
     return;
   }

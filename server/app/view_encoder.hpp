@@ -20,6 +20,10 @@ struct TrackedFrame {
   TrackedEvent tracked;
 };
 
+/// How a view of this size is coded. The encoder takes 1 to 240 pictures a second; a camera outside
+/// that is coded as if at the nearest.
+VideoEncoderOptions VideoOptions(int width, int height, double fps_hz, int bit_rate_bit_s);
+
 /// The picture of one view. Any thread.
 using DrawView = std::function<cv::Mat(const TrackedFrame&)>;
 
@@ -49,6 +53,7 @@ class ViewEncoder {
   double bit_rate_bit_s() const { return bits_.At(MonotonicNow()).sum_per_second; }
 
  private:
+  absl::StatusOr<EncodedPicture> DrawAndCode(const TrackedFrame& frame);
   void Step(const TrackedFrame& frame);
   /// Codes the newest frame once more if no other comes and the last time is long enough ago.
   void PostAgain();

@@ -6,56 +6,24 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
-#include <iostream>
 #include <mutex>
 #include <stop_token>
 #include <thread>
+#include <utility>
 
 #include "server/capture/camera_file.hpp"
-#include "server/capture/image_file.hpp"
+#include "server/capture/frame_decoder.hpp"
 #include "server/capture/image_list.hpp"
 #include "server/capture/target_file.hpp"
+#include "shared/io/log.hpp"
+#include "shared/io/regular_file.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr std::size_t kReadAhead = 6;  // frames; a few megabytes
-
-/// Decodes frames by index; shared by both ways of delivery. One thread at a time.
-class FrameDecoder {
- public:
-  FrameDecoder(std::filesystem::path folder, std::vector<ImageEntry> entries,
-               std::shared_ptr<const CameraModel> camera)
-      : folder_(std::move(folder)), entries_(std::move(entries)), camera_(std::move(camera)) {}
-
-  const std::vector<ImageEntry>& entries() const { return entries_; }
-
-  absl::StatusOr<Frame> Decode(std::size_t index) const {
-    const ImageEntry& entry = entries_[index];
-    absl::StatusOr<Picture> picture = LoadPicture(folder_ / entry.file);
-    if (!picture.ok()) return picture.status();
-    if (picture->grey.cols != camera_->width() || picture->grey.rows != camera_->height()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          (folder_ / entry.file).string(), ": is ", picture->grey.cols, "x", picture->grey.rows,
-          " but camera.yaml says ", camera_->width(), "x", camera_->height(),
-          "; correct width and height (and fx, fy, cx, cy with them)"));
-    }
-    Frame frame;
-    frame.id = index;
-    frame.capture_time_ns = entry.time_ns;
-    frame.received_time_ns = MonotonicNow();
-    frame.source_timestamp = entry.timestamp;
-    frame.grey = std::move(picture->grey);
-    frame.color = std::move(picture->color);
-    frame.camera = camera_;
-    return frame;
-  }
-
- private:
-  std::filesystem::path folder_;
-  std::vector<ImageEntry> entries_;
-  std::shared_ptr<const CameraModel> camera_;
-};
+// While no file descriptor is free: how often to look, and how often to say so.
+constexpr std::chrono::milliseconds kLookAgain(200);
+constexpr Timestamp kSayAgain_ns = 5'000'000'000;
 
 class DatasetSource : public FrameSource {
  public:
@@ -66,14 +34,28 @@ class DatasetSource : public FrameSource {
   std::uint64_t bad_frames() const override { return bad_frames_; }
 
  protected:
-  /// The picture, or nothing if it is bad: then counted and named.
+  /// The picture, or nothing if it is bad (then counted and named) or the reader was stopped.
+  /// Waits while no file descriptor is free: that says nothing about the picture.
   std::optional<Frame> DecodeOrReport(std::uint64_t index) {
     absl::StatusOr<Frame> frame = decoder_.Decode(index);
+    const Timestamp begin = MonotonicNow();
+    for (Timestamp told = 0; absl::IsResourceExhausted(frame.status());
+         frame = decoder_.Decode(index)) {
+      if (told == 0 || MonotonicNow() - told > kSayAgain_ns) {
+        told = MonotonicNow();
+        Log(absl::StrCat("frame ", index, " waits: ", frame.status().message()));
+      }
+      std::unique_lock lock(mutex_);
+      if (changed_.wait_for(lock, kLookAgain, [this] { return stopped_; })) return std::nullopt;
+      waited_ns_ = MonotonicNow() - begin;
+    }
     if (frame.ok()) return *std::move(frame);
     ++bad_frames_;
-    std::cerr << absl::StrCat("frame ", index, " skipped: ", frame.status().message(), "\n");
+    Log(absl::StrCat("frame ", index, " skipped: ", frame.status().message()));
     return std::nullopt;
   }
+  /// How long the last DecodeOrReport waited for a descriptor; since then not asked.
+  Timestamp TakeWaited() { return std::exchange(waited_ns_, 0); }
 
   const FrameDecoder decoder_;
   std::uint64_t next_;
@@ -83,6 +65,7 @@ class DatasetSource : public FrameSource {
   bool stopped_ = false;  // guarded by mutex_
 
  private:
+  Timestamp waited_ns_ = 0;  // reading thread
   const SourceInfo info_;
   std::atomic<std::uint64_t> bad_frames_ = 0;
 };
@@ -120,7 +103,8 @@ class EveryFrameSource final : public DatasetSource {
       std::optional<Frame> frame = DecodeOrReport(next_);
       if (!frame) continue;
       std::unique_lock lock(mutex_);
-      if (!changed_.wait(lock, stop, [this] { return ready_.size() < kReadAhead; })) return;
+      const auto room = [this] { return ready_.size() < decoder_.read_ahead(); };
+      if (!changed_.wait(lock, stop, room)) return;
       ready_.push_back(*std::move(frame));
       changed_.notify_all();
     }
@@ -149,6 +133,8 @@ class RealtimeSource final : public DatasetSource {
       while (next_ + 1 < end_ && DueAt(next_ + 1) <= now) ++next_;  // late: the newest wins
       const std::uint64_t index = next_++;
       std::optional<Frame> frame = DecodeOrReport(index);
+      origin_ns_ += TakeWaited();  // the recording stood still: nothing of it is left out
+      if (!frame && Stopped()) return std::nullopt;
       if (!frame) continue;
       if (!WaitUntil(DueAt(index))) return std::nullopt;
       frame->received_time_ns = MonotonicNow();
@@ -167,6 +153,10 @@ class RealtimeSource final : public DatasetSource {
   Timestamp TimeOf(std::uint64_t index) const { return decoder_.entries()[index].time_ns; }
   Timestamp DueAt(std::uint64_t index) const { return origin_ns_ + TimeOf(index); }
 
+  bool Stopped() {
+    const std::lock_guard lock(mutex_);
+    return stopped_;
+  }
   /// False if stopped.
   bool WaitUntil(Timestamp due_ns) {
     const std::chrono::steady_clock::time_point due{std::chrono::nanoseconds(due_ns)};
@@ -195,14 +185,14 @@ absl::Status CheckFolder(const std::filesystem::path& folder) {
 /// Target and start pose, where the folder has them.
 absl::Status ReadFacts(const std::filesystem::path& folder, std::uint64_t first_frame,
                        SourceInfo* info) {
-  if (std::filesystem::exists(folder / "target.yaml")) {
+  if (MayExist(folder / "target.yaml")) {
     absl::StatusOr<Target> target = LoadTarget(folder / "target.yaml");
     if (!target.ok()) return target.status();
     auto* board = std::get_if<ChessboardTarget>(&*target);
     if (board != nullptr && first_frame > 0) board->hint_px.reset();
     info->target = *std::move(target);
   }
-  if (std::filesystem::exists(folder / "start.yaml")) {
+  if (MayExist(folder / "start.yaml")) {
     absl::StatusOr<StartPose> start = LoadStart(folder / "start.yaml");
     if (!start.ok()) return start.status();
     if (first_frame == 0) info->start = *start;
@@ -217,7 +207,8 @@ absl::Status CheckFirstPicture(const FrameDecoder& decoder, std::uint64_t first,
   absl::Status last;
   for (std::uint64_t i = first; i < std::min(end, first + kTries); ++i) {
     last = decoder.Decode(i).status();
-    if (last.ok() || last.code() == absl::StatusCode::kInvalidArgument) return last;
+    // No descriptor is free: the next picture would not be read either.
+    if (last.ok() || absl::IsInvalidArgument(last) || absl::IsResourceExhausted(last)) return last;
   }
   return absl::DataLossError(absl::StrCat("no picture can be decoded; ", last.message()));
 }

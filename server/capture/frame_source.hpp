@@ -32,7 +32,8 @@ class FrameSource {
   virtual const SourceInfo& info() const = 0;
   /// The next frame, or nothing at the end.
   /// A frame that cannot be decoded is skipped, counted in bad_frames() and named on stderr; an
-  /// error means that the source as a whole is gone.
+  /// error means that the source as a whole is gone. Waits while the process has no file descriptor
+  /// left.
   virtual absl::StatusOr<std::optional<Frame>> Next() = 0;
   virtual std::uint64_t bad_frames() const = 0;
   /// Makes a Next() that waits for its time return nothing at once, and every later one. Any

@@ -4,11 +4,14 @@
 
 #include <cstdint>
 #include <cstring>
-#include <fstream>
+#include <exception>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <span>
-#include <vector>
+#include <string>
+
+#include "server/capture/picture_header.hpp"
+#include "shared/io/regular_file.hpp"
 
 namespace saccade {
 namespace {
@@ -53,25 +56,26 @@ absl::Status CheckWhole(Bytes data) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<std::uint8_t>> ReadBytes(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);
-  if (error) return absl::NotFoundError(error.message());
-  if (size > kMaxBytes) return absl::DataLossError("the file is too large for a picture");
-  std::vector<std::uint8_t> bytes(size);
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (!stream) return absl::DataLossError("the file cannot be read");
-  return bytes;
+absl::Status CheckSize(cv::Size size, const SizeCheck& check) {
+  if (check) {
+    if (absl::Status status = check(size); !status.ok()) return status;
+  }
+  const std::int64_t pixels = std::int64_t{size.width} * size.height;
+  if (size.width > kMaxPictureSide_px || size.height > kMaxPictureSide_px ||
+      pixels > kMaxPicturePixels) {
+    return absl::DataLossError(absl::StrCat("it is ", size.width, "x", size.height, "; at most ",
+                                            kMaxPictureSide_px, " a side and ", kMaxPicturePixels,
+                                            " pixels are decoded: scale it down"));
+  }
+  return absl::OkStatus();
 }
 
-absl::StatusOr<Picture> Decode(const std::vector<std::uint8_t>& bytes) {
-  cv::Mat decoded;
-  try {
-    decoded = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception& e) {
-    return absl::DataLossError(absl::StrCat("the decoder refused it (", e.err, ")"));
-  }
+/// May throw what OpenCV and the allocator throw.
+absl::StatusOr<Picture> Decode(Bytes bytes) {
+  // A view of the bytes; OpenCV does not write into it.
+  const cv::Mat view(1, static_cast<int>(bytes.size()), CV_8UC1,
+                     const_cast<std::uint8_t*>(bytes.data()));
+  cv::Mat decoded = cv::imdecode(view, cv::IMREAD_UNCHANGED);
   if (decoded.empty()) return absl::DataLossError("it is damaged or not a picture");
   if (decoded.depth() != CV_8U) {
     return absl::DataLossError("it has more than 8 bits a channel; convert it to 8 bits");
@@ -89,18 +93,33 @@ absl::StatusOr<Picture> Decode(const std::vector<std::uint8_t>& bytes) {
   return picture;
 }
 
+absl::StatusOr<Picture> CheckAndDecode(Bytes bytes, const SizeCheck& check) {
+  if (const absl::Status whole = CheckWhole(bytes); !whole.ok()) return whole;
+  const absl::StatusOr<cv::Size> size = ReadPictureSize(bytes);
+  if (!size.ok()) return size.status();
+  if (const absl::Status fits = CheckSize(*size, check); !fits.ok()) return fits;
+  try {
+    return Decode(bytes);
+  } catch (const cv::Exception& e) {
+    return absl::DataLossError(absl::StrCat("the decoder refused it (", e.err, ")"));
+  } catch (const std::exception& e) {  // no memory
+    return absl::DataLossError(absl::StrCat("it cannot be decoded (", e.what(), ")"));
+  }
+}
+
 }  // namespace
 
-absl::StatusOr<Picture> LoadPicture(const std::filesystem::path& file) {
-  const auto named = [&file](const absl::Status& status) {
-    return absl::Status(status.code(), absl::StrCat(file.string(), ": ", status.message()));
-  };
-  const auto bytes = ReadBytes(file);
-  if (!bytes.ok()) return named(bytes.status());
-  if (const absl::Status whole = CheckWhole(*bytes); !whole.ok()) return named(whole);
-  absl::StatusOr<Picture> picture = Decode(*bytes);
-  if (!picture.ok()) return named(picture.status());
-  return picture;
+absl::StatusOr<Picture> LoadPicture(const std::filesystem::path& file, const SizeCheck& check) {
+  const absl::StatusOr<std::string> bytes = ReadRegularFile(file, kMaxBytes, "a picture");
+  if (absl::IsNotFound(bytes.status()) || absl::IsResourceExhausted(bytes.status())) {
+    return bytes.status();
+  }
+  if (!bytes.ok()) return absl::DataLossError(bytes.status().message());
+  absl::StatusOr<Picture> picture =
+      CheckAndDecode({reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()}, check);
+  if (picture.ok()) return picture;
+  return absl::Status(picture.status().code(),
+                      absl::StrCat(file.string(), ": ", picture.status().message()));
 }
 
 }  // namespace saccade

@@ -2,15 +2,18 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
 
-#include <fstream>
 #include <limits>
+
+#include "shared/io/regular_file.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr std::size_t kMaxLine = 4096;
+constexpr std::size_t kMaxBytes = std::size_t{64} << 20;  // a million pictures: nine hours
 
 absl::Status At(const std::filesystem::path& file, int line, absl::string_view problem) {
   return absl::InvalidArgumentError(absl::StrCat(file.string(), ":", line, ": ", problem));
@@ -54,15 +57,17 @@ absl::StatusOr<Timestamp> ParseSeconds(absl::string_view text) {
 }
 
 absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream) {
+  const absl::StatusOr<std::string> list = ReadRegularFile(file, kMaxBytes, "a list of pictures");
+  if (absl::IsNotFound(list.status())) {
     return absl::NotFoundError(absl::StrCat(
         file.string(), ": cannot be opened; a data set in TUM layout needs rgb.txt with ",
         "one line `SECONDS FILE` for each picture"));
   }
+  if (!list.ok()) return list.status();
   std::vector<ImageEntry> entries;
-  std::string text;
-  for (int line = 1; std::getline(stream, text); ++line) {
+  int line = 0;
+  for (const absl::string_view text : absl::StrSplit(*list, '\n')) {
+    ++line;
     if (text.size() > kMaxLine) return At(file, line, "is too long; is this a text file?");
     absl::string_view rest = text;
     if (line == 1) absl::ConsumePrefix(&rest, "\xEF\xBB\xBF");
@@ -89,7 +94,6 @@ absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::pat
     }
     entries.push_back(std::move(entry));
   }
-  if (stream.bad()) return absl::DataLossError(absl::StrCat(file.string(), ": reading failed"));
   if (entries.empty()) {
     return absl::InvalidArgumentError(
         absl::StrCat(file.string(), ": lists no picture; write one line `SECONDS FILE` for each"));

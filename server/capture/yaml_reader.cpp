@@ -6,8 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+#include <exception>
+
+#include "shared/io/regular_file.hpp"
 
 namespace saccade {
 namespace {
@@ -26,31 +27,18 @@ std::string RangeText(const YamlReader::Range& range) {
 }  // namespace
 
 YamlReader::YamlReader(const std::filesystem::path& file) : file_(file.string()) {
-  std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);
-  if (error) {
-    status_ = absl::NotFoundError(
-        absl::StrCat(file_, ": ", error.message(), "; create the file or correct the path"));
-    return;
-  }
-  if (size > kMaxBytes) {
-    status_ = absl::InvalidArgumentError(
-        absl::StrCat(file_, ": ", size, " bytes is too long for a YAML settings file (limit ",
-                     kMaxBytes, "); is it the right file?"));
-    return;
-  }
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (!stream) {
-    status_ =
-        absl::PermissionDeniedError(absl::StrCat(file_, ": cannot be read; check its permissions"));
+  const absl::StatusOr<std::string> text = ReadRegularFile(file, kMaxBytes, "a YAML settings file");
+  if (!text.ok()) {
+    status_ = text.status();
     return;
   }
   try {
-    node_ = YAML::Load(text.str());
+    node_ = YAML::Load(*text);
   } catch (const YAML::Exception& e) {
     FailAt(e.mark, absl::StrCat("not valid YAML (", e.msg, ")"));
+    return;
+  } catch (const std::exception& e) {  // no memory
+    FailAt(YAML::Mark::null_mark(), absl::StrCat("cannot be read (", e.what(), ")"));
     return;
   }
   if (!node_.IsMap()) FailAt(node_.Mark(), "must be a list of `key: value` lines");
@@ -125,7 +113,7 @@ std::string YamlReader::Text(absl::string_view key) {
 }
 
 std::vector<double> YamlReader::Numbers(absl::string_view key, std::optional<std::size_t> count,
-                                        bool optional) {
+                                        bool optional, Range range) {
   if (!ok()) return {};
   const YAML::Node value = Get(key);
   if (!value.IsDefined() || value.IsNull()) {
@@ -140,6 +128,11 @@ std::vector<double> YamlReader::Numbers(absl::string_view key, std::optional<std
   for (const auto& entry : value) numbers.push_back(Finite(key, entry));
   if (ok() && count && numbers.size() != *count) {
     Fail(key, absl::StrCat("has ", numbers.size(), " numbers; give ", *count));
+  }
+  for (const double number : numbers) {
+    if (ok() && (number < range.min || number > range.max)) {
+      Fail(key, absl::StrCat(number, " is out of range; give numbers", RangeText(range)));
+    }
   }
   return ok() ? numbers : std::vector<double>();
 }

@@ -13,20 +13,20 @@
 
 namespace saccade {
 
+struct YamlRange {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool min_excluded = false;
+};
+
 /// Reads the fields of one YAML map and keeps the first error, with file, line, field and remedy,
 /// so that a parser reads as a list of fields with one check of status() at its end. After an error
 /// every call answers with a harmless default.
 class YamlReader {
  public:
-  struct Range {
-    double min = -std::numeric_limits<double>::infinity();
-    double max = std::numeric_limits<double>::infinity();
-    bool min_excluded = false;
-  };
-  static constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity(), true};
-  static constexpr Range kNotNegative{0.0, std::numeric_limits<double>::infinity(), false};
+  using Range = YamlRange;
 
-  /// Loads `file`, which must hold a map.
+  /// Loads `file`, which must be a regular file of at most 1 MiB and hold a map.
   explicit YamlReader(const std::filesystem::path& file);
 
   const absl::Status& status() const { return status_; }
@@ -36,9 +36,10 @@ class YamlReader {
   double Number(absl::string_view key, Range range, std::optional<double> fallback = std::nullopt);
   int Integer(absl::string_view key, int min, int max);
   std::string Text(absl::string_view key);
-  /// A list of finite numbers; `count` of them, if given. An absent optional list is empty.
+  /// A list of finite numbers in `range`; `count` of them, if given. An absent optional list is
+  /// empty.
   std::vector<double> Numbers(absl::string_view key, std::optional<std::size_t> count,
-                              bool optional = false);
+                              bool optional = false, Range range = Range());
   /// Makes any key not named here an error: a misspelt optional field must not pass unseen.
   void AllowOnly(std::initializer_list<absl::string_view> keys);
 

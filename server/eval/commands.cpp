@@ -10,6 +10,7 @@
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/score.hpp"
 #include "server/eval/tracker_session.hpp"
+#include "shared/io/regular_file.hpp"
 
 namespace saccade {
 
@@ -22,7 +23,7 @@ absl::Status RunCommand(const RunArguments& arguments) {
   const auto source = OpenDataset(arguments.dataset, options);
   if (!source.ok()) return source.status();
   Trajectory truth;
-  if (std::filesystem::exists(arguments.dataset / "groundtruth.txt")) {
+  if (MayExist(arguments.dataset / "groundtruth.txt")) {
     absl::StatusOr<Trajectory> loaded = LoadTrajectory(arguments.dataset / "groundtruth.txt");
     if (!loaded.ok()) return loaded.status();
     truth = *std::move(loaded);

@@ -1,8 +1,11 @@
 #include <absl/status/status.h>
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
+#include <exception>
 #include <iostream>
 #include <opencv2/core/utility.hpp>
 
@@ -19,6 +22,29 @@ int Fail(const absl::Status& status) {
   }
   std::cerr << "saccade-eval: " << text << "\n";
   return 1;
+}
+
+/// CLI::Range lets NaN through: no comparison with it holds.
+CLI::Validator Finite() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double number = 0;
+        return CLI::detail::lexical_cast(text, number) && std::isfinite(number)
+                   ? std::string()
+                   : absl::StrCat("'", text, "' is not a finite number");
+      },
+      "");
+}
+
+/// CLI11 reads -1 as the largest number there is.
+CLI::Validator NotNegative() {
+  return CLI::Validator(
+      [](std::string& text) {
+        return text.find('-') == std::string::npos
+                   ? std::string()
+                   : absl::StrCat("'", text, "' is not a whole number from 0");
+      },
+      "");
 }
 
 void AddRun(CLI::App& app, RunArguments& arguments) {
@@ -51,12 +77,14 @@ void AddSim(CLI::App& app, SimArguments& arguments) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   sim->add_option("--seed", arguments.seed, "Seed of the first run; run k takes seed + k")
+      ->check(NotNegative())
       ->capture_default_str();
   sim->add_option("--out", arguments.out, "Folder for report.json and one folder for each run")
       ->required();
   sim->add_option("--duration", arguments.duration_s,
                   "Seconds of each run; by default 60, or what the closed-loop scenario asks for")
-      ->check(CLI::Range(1.0, 36000.0));
+      ->check(CLI::Range(1.0, 36000.0))
+      ->check(Finite());
   sim->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
   sim->add_option("--set", arguments.tracker.set,
                   "One tracker option as key=value; may be repeated")
@@ -105,6 +133,7 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
   }
+  signal(SIGINT, SIG_DFL);  // a shell starts what is in the background deaf to it
   absl::Status status;
   if (app.got_subcommand("run")) status = RunCommand(run);
   if (app.got_subcommand("score")) status = ScoreCommand(score);
@@ -117,4 +146,10 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace saccade
 
-int main(int argc, char** argv) { return saccade::Main(argc, argv); }
+int main(int argc, char** argv) {
+  try {
+    return saccade::Main(argc, argv);
+  } catch (const std::exception& error) {  // no memory, or a name that is not text meets JSON
+    return saccade::Fail(absl::InternalError(error.what()));
+  }
+}

@@ -8,14 +8,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 
 #include "server/capture/image_list.hpp"
+#include "shared/io/regular_file.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr std::size_t kMaxLine = 4096;
+constexpr std::size_t kMaxBytes = std::size_t{256} << 20;
 
 absl::StatusOr<StampedPose> ParseLine(absl::string_view line) {
   const std::vector<absl::string_view> fields =
@@ -45,14 +46,16 @@ absl::StatusOr<StampedPose> ParseLine(absl::string_view line) {
 }  // namespace
 
 absl::StatusOr<Trajectory> LoadTrajectory(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream) {
+  const absl::StatusOr<std::string> whole = ReadRegularFile(file, kMaxBytes, "a trajectory");
+  if (absl::IsNotFound(whole.status())) {
     return absl::NotFoundError(
         absl::StrCat(file.string(), ": cannot be opened; give a file in TUM format"));
   }
+  if (!whole.ok()) return whole.status();
   Trajectory trajectory;
-  std::string text;
-  for (int line = 1; std::getline(stream, text); ++line) {
+  int line = 0;
+  for (const absl::string_view text : absl::StrSplit(*whole, '\n')) {
+    ++line;
     const auto at = [&](absl::string_view problem) {
       return absl::InvalidArgumentError(
           absl::StrCat(file.string(), ":", line, ": ", problem,

@@ -5,7 +5,6 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <cstdio>
 #include <exception>
 #include <thread>
 #include <unordered_map>
@@ -14,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/gateway/http_connection.hpp"
 #include "server/pipeline/descriptors.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 
@@ -120,7 +120,7 @@ class Gateway::Impl {
         io_.run();
         return;
       } catch (const std::exception& thrown) {
-        std::fprintf(stderr, "gateway: %s\n", thrown.what());
+        Log(absl::StrCat("gateway: ", Printable(thrown.what())));
       }
     }
   }

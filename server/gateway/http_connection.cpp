@@ -6,7 +6,6 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <chrono>
-#include <cstdio>
 #include <exception>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "server/gateway/http_request_reader.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -26,7 +26,7 @@ using boost::system::error_code;
 
 constexpr std::size_t kMaxHeadBytes = 16 * 1024;
 // What may come while we answer: the next requests of a client that pipelines.
-constexpr std::size_t kMaxPipelinedBytes = 64 * 1024;
+constexpr std::size_t kMaxPipelinedBytes = 512 * 1024;
 // Everything from us, nothing inline, nothing framed: the page needs no more.
 constexpr char kContentSecurityPolicy[] =
     "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; "
@@ -74,7 +74,7 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     try {
       work();
     } catch (const std::exception& thrown) {
-      std::fprintf(stderr, "gateway: %s: %s\n", peer_.c_str(), thrown.what());
+      Log(absl::StrCat("gateway: ", peer_, ": ", Printable(thrown.what())));
       Close();
     }
   }

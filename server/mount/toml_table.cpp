@@ -3,9 +3,12 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include <cmath>
 #include <set>
 #include <toml.hpp>
 #include <utility>
+
+#include "shared/io/toml_file.hpp"
 
 namespace saccade {
 
@@ -30,7 +33,9 @@ struct TomlTable::State {
         file->path, absl::InvalidArgumentError(absl::StrCat(prefix, ".", key, ": ", problem)));
   }
   void Read(const toml::value& value, const std::string& key, double scale, double& out) {
-    if (value.is_floating()) {
+    if (value.is_floating() && !std::isfinite(value.as_floating())) {
+      Say(key, "is not a finite number; give one");
+    } else if (value.is_floating()) {
       out = scale * value.as_floating();
     } else if (value.is_integer()) {
       out = scale * static_cast<double>(value.as_integer());
@@ -53,14 +58,12 @@ absl::Status InFile(const std::filesystem::path& file, const absl::Status& statu
 
 absl::StatusOr<std::optional<TomlTable>> TomlTable::Load(const std::filesystem::path& file,
                                                          const std::string& name) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) {
-    return absl::NotFoundError(absl::StrCat(file.string(), ": no such file; give one that exists"));
-  }
+  absl::StatusOr<toml::value> root = ParseTomlFile(file);
+  if (!root.ok()) return root.status();
   auto read = std::make_shared<File>();
   read->path = file;
   try {
-    read->root = toml::parse(file.string());
+    read->root = *std::move(root);
     if (!read->root.contains(name)) return std::nullopt;
     const toml::value& table = read->root.at(name);
     if (!table.is_table()) {

@@ -19,8 +19,8 @@ namespace saccade {
 class TomlTable {
  public:
   /// The table `name` of `file`; nothing where the file has none.
-  ///   NotFound         no such file
-  ///   InvalidArgument  not TOML, or `name` is not a table
+  /// Errors as ParseTomlFile (shared/io), and
+  ///   InvalidArgument  `name` is not a table
   static absl::StatusOr<std::optional<TomlTable>> Load(const std::filesystem::path& file,
                                                        const std::string& name);
 

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <tuple>
 
 #include "server/overlay/characters.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -105,7 +105,7 @@ const FontCatalogue& FontCatalogue::System() {
   static const FontCatalogue catalogue = [] {
     FontCatalogue read(ListFonts());
     for (const std::string& line : read.Missing()) {
-      std::fprintf(stderr, "saccade: %s\n", line.c_str());
+      Log(line);
     }
     return read;
   }();

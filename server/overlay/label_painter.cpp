@@ -17,6 +17,7 @@ constexpr double kShort_px = 220.0, kLong_px = 380.0;  // widths of the text
 constexpr int kShortLines = 3;
 constexpr double kStatus_px = 30.0;  // at the bottom, kept free
 constexpr double kSmallest = 0.78;   // of kText_px, where a text would not fit otherwise
+constexpr double kLookedAt = 0.3;    // of the picture's height, from its middle
 constexpr std::string_view kWarning = "do not trust";
 
 class LabelPainter {
@@ -117,7 +118,9 @@ void DrawLabels(std::vector<ColoredLabel> labels, cv::Mat& picture, Painter& pai
   std::size_t opened = labels.size();
   for (std::size_t i = 0; i < labels.size(); ++i) {
     sprites.push_back(drawer.Short(labels[i]));
-    if (!sprites[i]->cut || opened != labels.size()) continue;
+    const double away = (labels[i].label->at_px - middle).norm();
+    const bool looked_at = away < kLookedAt * picture.rows;
+    if (!sprites[i]->cut || !looked_at || opened != labels.size()) continue;
     opened = i;
     sprites[i] = drawer.Whole(labels[i]);
   }

@@ -15,8 +15,8 @@ struct ColoredLabel {
 
 /// Draws the 48 labels nearest the middle of the picture, nearest on top, each inside the picture
 /// as a whole. A text of up to three short lines is always whole. Of the longer ones, that nearest
-/// the middle is whole, up to the picture's size; the others show three lines and an ellipsis: to
-/// read one, turn towards it.
+/// the middle is whole if it is within 0.3 of the picture's height from it; the others show three
+/// lines and an ellipsis: to read one, look at it.
 void DrawLabels(std::vector<ColoredLabel> labels, cv::Mat& picture, Painter& painter);
 
 }  // namespace saccade

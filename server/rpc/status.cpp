@@ -5,10 +5,10 @@
 #include <absl/time/time.h>
 
 #include <atomic>
-#include <cstdio>
 #include <optional>
 
 #include "server/pipeline/busy.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -85,9 +85,10 @@ void Audit(const char* method, const std::string& participant_id, const absl::St
   if (!IsWorthALine(status, unsaid)) return;
   const std::string time =
       absl::FormatTime("%Y-%m-%dT%H:%M:%E3SZ", absl::Now(), absl::UTCTimeZone());
-  std::fprintf(stderr, "%s rpc %s participant=%.36s %s%s\n", time.c_str(), method,
-               participant_id.c_str(), status.ok() ? "ok" : status.ToString().c_str(),
-               unsaid == 0 ? "" : absl::StrCat(" (and ", unsaid, " more)").c_str());
+  Log(absl::StrCat(time, " rpc ", Printable(method),
+                   " participant=", Printable(participant_id.substr(0, 36)), " ",
+                   status.ok() ? "ok" : Printable(status.ToString()),
+                   unsaid == 0 ? "" : absl::StrCat(" (and ", unsaid, " more)")));
 }
 
 }  // namespace saccade

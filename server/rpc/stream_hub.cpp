@@ -69,11 +69,11 @@ void StreamHub::AbandonTheSilent(Timestamp now_ns) {
       return true;
     });
   }
+  if (!silent.empty()) StreamsChanged();
   for (const auto& stream : silent) {
     stream->Abandon(absl::DeadlineExceededError(absl::StrCat(
         "no event was acknowledged for ", silence_ns_ / 1'000'000'000, " s: subscribe again")));
   }
-  if (!silent.empty()) StreamsChanged();
 }
 
 struct StreamHub::Round {

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <mutex>
 #include <utility>
 
 namespace saccade {
@@ -11,12 +12,33 @@ constexpr std::size_t kMaxRequests = 10'000;
 
 }  // namespace
 
+class AnnotationBook::Owed {
+ public:
+  explicit Owed(std::function<void()> wake) : wake_(std::move(wake)) {}
+  void Add(std::function<void()> answer) {
+    {
+      const std::lock_guard lock(mutex_);
+      answers_.push_back(std::move(answer));
+    }
+    if (wake_) wake_();
+  }
+  std::vector<std::function<void()>> Take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(answers_, {});
+  }
+
+ private:
+  const std::function<void()> wake_;
+  std::mutex mutex_;
+  std::vector<std::function<void()>> answers_;
+};
+
 absl::StatusOr<std::unique_ptr<AnnotationBook>> AnnotationBook::Open(
     AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-    std::unique_ptr<AnnotationStore> store) {
+    std::unique_ptr<AnnotationStore> store, std::function<void()> wake) {
   if (absl::Status status = options.Validate(); !status.ok()) return status;
-  std::unique_ptr<AnnotationBook> book(
-      new AnnotationBook(std::move(options), std::move(frames), std::move(seed), std::move(store)));
+  std::unique_ptr<AnnotationBook> book(new AnnotationBook(
+      std::move(options), std::move(frames), std::move(seed), std::move(store), std::move(wake)));
   if (!book->store_) return book;
   absl::StatusOr<StoredAnnotations> stored = book->store_->LoadAll();
   if (!stored.ok()) return stored.status();
@@ -28,8 +50,15 @@ absl::StatusOr<std::unique_ptr<AnnotationBook>> AnnotationBook::Open(
 }
 
 AnnotationBook::AnnotationBook(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-                               std::unique_ptr<AnnotationStore> store)
-    : anchors_(std::move(options), std::move(frames), std::move(seed)), store_(std::move(store)) {}
+                               std::unique_ptr<AnnotationStore> store, std::function<void()> wake)
+    : anchors_(std::move(options), std::move(frames), std::move(seed)),
+      owed_(std::make_shared<Owed>(std::move(wake))),
+      store_(std::move(store)) {}
+
+AnnotationBook::~AnnotationBook() {
+  store_ = nullptr;
+  for (const auto& answer : owed_->Take()) answer();
+}
 
 void AnnotationBook::Remember(const std::string& request_id, AnsweredCreate answered) {
   if (request_id.empty()) return;
@@ -42,14 +71,19 @@ void AnnotationBook::Remember(const std::string& request_id, AnsweredCreate answ
 
 void AnnotationBook::Settle() {
   if (!store_) return;
+  // First: the failure that an answer tells of is then seen below, unless it was settled before.
+  const std::vector<std::function<void()>> answers = owed_->Take();
   const absl::Status failure = store_->failure();
   const std::uint64_t committed = store_->committed_sequence();
   anchors_.Committed(committed);
-  if (failure.ok()) return;
-  anchors_.RollBack(committed);
-  absl::erase_if(requests_,
-                 [committed](const auto& request) { return request.second.sequence > committed; });
-  store_->Resume();
+  if (!failure.ok()) {
+    anchors_.RollBack(committed);
+    absl::erase_if(requests_, [committed](const auto& request) {
+      return request.second.sequence > committed;
+    });
+    store_->Resume();
+  }
+  for (const auto& answer : answers) answer();
 }
 
 bool AnnotationBook::AnswerAgain(const std::string& request_id, const AnnotationDone& done) {
@@ -64,9 +98,10 @@ bool AnnotationBook::AnswerAgain(const std::string& request_id, const Annotation
   } else if (!store_) {
     done(*std::move(annotation));
   } else {  // the first answer may still be on its way to the disk
-    const absl::Status queued =
-        store_->SubmitBarrier([done, answer = *std::move(annotation)](const absl::Status& status) {
-          status.ok() ? done(answer) : done(status);
+    const absl::Status queued = store_->SubmitBarrier(
+        [done, answer = *std::move(annotation), owed = owed_](const absl::Status& status) {
+          if (status.ok()) return done(answer);
+          owed->Add([done, status] { done(status); });
         });
     if (!queued.ok()) done(queued);
   }
@@ -80,11 +115,12 @@ void AnnotationBook::Commit(AnnotationEdit edit, AnnotationDone done) {
     done(edit.annotation);
     return;
   }
-  const absl::Status queued =
-      store_->Submit(std::move(edit.change),
-                     [done, answer = std::move(edit.annotation)](const absl::Status& status) {
-                       status.ok() ? done(answer) : done(status);
-                     });
+  const absl::Status queued = store_->Submit(
+      std::move(edit.change),
+      [done, answer = std::move(edit.annotation), owed = owed_](const absl::Status& status) {
+        if (status.ok()) return done(answer);
+        owed->Add([done, status] { done(status); });
+      });
   if (queued.ok()) return;
   anchors_.RollBack(sequence - 1);
   absl::erase_if(requests_,

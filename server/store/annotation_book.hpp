@@ -17,17 +17,22 @@ namespace saccade {
 
 /// The annotations as RPCs see them: AnchorManager with AnnotationStore behind it. Every call but
 /// Latest() on the tracker thread. An answer is given after commit, once, on the store's thread (or
-/// at once on the caller's, for a refusal); it must not call back into the book.
+/// at once on the caller's, for a refusal); it must not call back into the book. An edit that
+/// cannot be saved is taken back before it is answered, so that whoever hears of it lists what is
+/// on disk.
 class AnnotationBook {
  public:
   using AnnotationDone = std::function<void(const absl::StatusOr<Annotation>&)>;
   using DescriptionDone = std::function<void(const absl::StatusOr<std::string>&)>;
 
   /// Loads what is on disk. `store` may be null: nothing is kept (offline evaluation), answers come
-  /// at once.
+  /// at once. `wake` asks for a Settle() soon, on any thread; without it edits that could not be
+  /// saved are answered at the next call.
   static absl::StatusOr<std::unique_ptr<AnnotationBook>> Open(
       AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-      std::unique_ptr<AnnotationStore> store);
+      std::unique_ptr<AnnotationStore> store, std::function<void()> wake = nullptr);
+  /// Commits what is queued and gives every answer that is owed.
+  ~AnnotationBook();
 
   /// A draft whose request id was answered before is answered with that annotation again.
   void Create(const AnnotationDraft& draft, const std::string& session_id, AnnotationDone done);
@@ -42,6 +47,15 @@ class AnnotationBook {
   std::vector<AnchorMoved> OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
                                       const CameraModel& camera);
 
+  /// Follows the store: forgets what is on disk; after a failed commit takes memory back to it and
+  /// answers those whose edits were lost. Every other call begins with it.
+  void Settle();
+
+  /// As AnnotationStore::Flush. Any thread.
+  absl::Status Flush(std::chrono::milliseconds limit) {
+    return store_ ? store_->Flush(limit) : absl::OkStatus();
+  }
+
   /// The session ended: what it did can no longer be undone.
   void ForgetSession(const std::string& session_id) { anchors_.ForgetSession(session_id); }
 
@@ -50,7 +64,9 @@ class AnnotationBook {
 
  private:
   AnnotationBook(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-                 std::unique_ptr<AnnotationStore> store);
+                 std::unique_ptr<AnnotationStore> store, std::function<void()> wake);
+  /// Answers to edits that could not be saved, until memory is taken back. Any thread.
+  class Owed;
   struct AnsweredCreate {
     std::string annotation_id;
     std::uint64_t sequence = 0;  // 0: before this run
@@ -59,12 +75,11 @@ class AnnotationBook {
   /// Answers a Create that was made before; false if it was not.
   bool AnswerAgain(const std::string& request_id, const AnnotationDone& done);
   void Remember(const std::string& request_id, AnsweredCreate answered);
-  /// Follows the store: forgets what is on disk; after a failed commit takes memory back.
-  void Settle();
   void Commit(AnnotationEdit edit, AnnotationDone done);
   void TakeBack(absl::StatusOr<AnnotationEdit> edit, DescriptionDone done);
 
   AnchorManager anchors_;
+  std::shared_ptr<Owed> owed_;
   std::unique_ptr<AnnotationStore> store_;
   absl::flat_hash_map<std::string, AnsweredCreate> requests_;  // by request id
   std::deque<std::string> request_order_;                      // oldest first

@@ -1,15 +1,10 @@
 #include "server/store/annotation_store.hpp"
 
 #include <absl/strings/str_cat.h>
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <condition_variable>
-#include <cstring>
 #include <deque>
 #include <mutex>
 #include <optional>
@@ -17,79 +12,26 @@
 #include <utility>
 
 #include "server/store/annotation_rows.hpp"
-#include "server/store/sqlite.hpp"
+#include "server/store/store_database.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
 
-/// Holds DIR/annotations.lock for this process; the system lets go of it however the process ends.
-class ProcessLock {
- public:
-  static absl::StatusOr<ProcessLock> Take(const std::filesystem::path& file) {
-    ProcessLock lock(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-    if (lock.descriptor_ < 0) {
-      const std::string what = absl::StrCat(file.string(), ": ", std::strerror(errno));
-      if (errno == ENOSPC || errno == EDQUOT) {
-        return absl::ResourceExhaustedError(
-            absl::StrCat(what, "; the disk is full: make room and try again"));
-      }
-      return absl::PermissionDeniedError(
-          absl::StrCat(what, "; make the directory writable or choose another --data-dir"));
-    }
-    if (::flock(lock.descriptor_, LOCK_EX | LOCK_NB) != 0) {
-      return absl::FailedPreconditionError(absl::StrCat(
-          file.parent_path().string(),
-          " is in use by another saccade-server; end that one or choose another --data-dir"));
-    }
-    return lock;
-  }
-  ProcessLock(ProcessLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
-  ProcessLock& operator=(ProcessLock&&) = delete;
-  ~ProcessLock() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-
- private:
-  explicit ProcessLock(int descriptor) : descriptor_(descriptor) {}
-  int descriptor_;
-};
+// How often the files are looked after while nothing is written.
+constexpr std::chrono::seconds kLookAfter(1);
 
 struct Item {
   std::optional<AnnotationChange> change;  // nothing: a barrier
   AnnotationStore::Done done;
 };
 
-absl::Status Configure(SqliteDatabase& database, const std::filesystem::path& file,
-                       const AnnotationStore::Options& options) {
-  for (const char* pragma :
-       {"PRAGMA busy_timeout = 2000", "PRAGMA journal_mode = WAL", "PRAGMA synchronous = FULL",
-        "PRAGMA wal_autocheckpoint = 256", "PRAGMA journal_size_limit = 4194304"}) {
-    if (absl::Status status = database.Execute(pragma); !status.ok()) return status;
-  }
-  if (options.max_bytes > 0) {
-    const std::string pragma = absl::StrCat("PRAGMA max_page_count = ",
-                                            std::max<std::int64_t>(1, options.max_bytes / 4096));
-    if (absl::Status status = database.Execute(pragma.c_str()); !status.ok()) return status;
-  }
-  const absl::StatusOr<std::string> check = database.Query("PRAGMA quick_check(1)");
-  if (!check.ok()) return check.status();
-  if (*check != "ok") {
-    return absl::DataLossError(
-        absl::StrCat(file.string(), " is damaged: ", *check,
-                     "; move the file away, or salvage it with: sqlite3 FILE .recover"));
-  }
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 class AnnotationStore::Impl {
  public:
-  Impl(ProcessLock lock, std::unique_ptr<SqliteDatabase> database, std::filesystem::path file,
-       const Options& options)
-      : lock_(std::move(lock)),
-        database_(std::move(database)),
-        file_(std::move(file)),
+  Impl(std::unique_ptr<StoreDatabase> database, const Options& options)
+      : database_(std::move(database)),
         options_(options),
         thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
@@ -107,7 +49,11 @@ class AnnotationStore::Impl {
     return absl::OkStatus();
   }
 
-  absl::StatusOr<StoredAnnotations> LoadAll() { return ReadAll(*database_, file_.string()); }
+  absl::StatusOr<StoredAnnotations> LoadAll() {
+    const std::lock_guard guard(database_mutex_);
+    if (absl::Status there = database_->EnsureInPlace(); !there.ok()) return there;
+    return ReadAll(database_->connection(), database_->file().string());
+  }
   std::uint64_t committed() const { return committed_.load(); }
   absl::Status failure() const {
     const std::lock_guard guard(mutex_);
@@ -125,9 +71,13 @@ class AnnotationStore::Impl {
       std::deque<Item> batch;
       {
         std::unique_lock guard(mutex_);
-        wake_.wait(guard, stop, [this] { return !queue_.empty(); });
-        if (queue_.empty()) return;
+        wake_.wait_for(guard, stop, kLookAfter, [this] { return !queue_.empty(); });
         batch.swap(queue_);
+      }
+      if (batch.empty()) {
+        LookAfterFiles();
+        if (stop.stop_requested()) return;
+        continue;
       }
       const absl::Status status = CommitBatch(batch);
       if (!status.ok()) Refuse(status, batch);
@@ -137,6 +87,15 @@ class AnnotationStore::Impl {
     }
   }
 
+  /// What was committed is found again, also if somebody deleted the files since. Says each new
+  /// problem once.
+  void LookAfterFiles() {
+    const std::lock_guard guard(database_mutex_);
+    const absl::Status there = database_->EnsureInPlace();
+    if (!there.ok() && there.message() != told_) Log(absl::StrCat("store: ", there.message()));
+    told_ = std::string(there.message());
+  }
+
   /// One transaction for the batch. On error nothing of it is on disk.
   absl::Status CommitBatch(const std::deque<Item>& batch) {
     std::uint64_t last = 0;
@@ -144,16 +103,24 @@ class AnnotationStore::Impl {
       if (item.change) last = std::max(last, item.change->sequence);
     }
     if (last == 0) return absl::OkStatus();  // barriers only
-    absl::Status status = database_->Execute("BEGIN IMMEDIATE");
+    {
+      const std::lock_guard guard(database_mutex_);
+      if (absl::Status there = database_->EnsureInPlace(); !there.ok()) return there;
+      if (absl::Status written = WriteBatch(batch); !written.ok()) return written;
+    }
+    committed_.store(last);
+    LookAfterFiles();  // deleted just then: written again before anybody is answered
+    return absl::OkStatus();
+  }
+
+  absl::Status WriteBatch(const std::deque<Item>& batch) {
+    SqliteDatabase& database = database_->connection();
+    absl::Status status = database.Execute("BEGIN IMMEDIATE");
     for (auto item = batch.begin(); status.ok() && item != batch.end(); ++item) {
-      if (item->change) status = WriteChange(*database_, *item->change);
+      if (item->change) status = WriteChange(database, *item->change);
     }
-    if (status.ok()) status = database_->Execute("COMMIT");
-    if (status.ok()) {
-      committed_.store(last);
-    } else if (database_->InTransaction()) {
-      database_->Execute("ROLLBACK").IgnoreError();
-    }
+    if (status.ok()) status = database.Execute("COMMIT");
+    if (!status.ok() && database.InTransaction()) database.Execute("ROLLBACK").IgnoreError();
     return status;
   }
 
@@ -165,9 +132,9 @@ class AnnotationStore::Impl {
     queue_.clear();
   }
 
-  ProcessLock lock_;
-  std::unique_ptr<SqliteDatabase> database_;  // LoadAll before the first Submit, then the thread
-  std::filesystem::path file_;
+  std::mutex database_mutex_;
+  std::unique_ptr<StoreDatabase> database_;  // guarded by database_mutex_
+  std::string told_;                         // likewise
   Options options_;
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
@@ -184,22 +151,11 @@ absl::StatusOr<std::unique_ptr<AnnotationStore>> AnnotationStore::Open(
 
 absl::StatusOr<std::unique_ptr<AnnotationStore>> AnnotationStore::Open(
     const std::filesystem::path& directory, const Options& options) {
-  std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (error) {
-    return absl::PermissionDeniedError(absl::StrCat("cannot create ", directory.string(), ": ",
-                                                    error.message(),
-                                                    "; choose another --data-dir"));
-  }
-  absl::StatusOr<ProcessLock> lock = ProcessLock::Take(directory / "annotations.lock");
-  if (!lock.ok()) return lock.status();
-  const std::filesystem::path file = directory / "annotations.sqlite";
-  absl::StatusOr<std::unique_ptr<SqliteDatabase>> database = SqliteDatabase::Open(file);
+  absl::StatusOr<std::unique_ptr<StoreDatabase>> database =
+      StoreDatabase::Open(directory, options.max_bytes);
   if (!database.ok()) return database.status();
-  if (absl::Status status = Configure(**database, file, options); !status.ok()) return status;
-  if (absl::Status status = Migrate(**database, file.string()); !status.ok()) return status;
-  return std::unique_ptr<AnnotationStore>(new AnnotationStore(
-      std::make_unique<Impl>(*std::move(lock), *std::move(database), file, options)));
+  return std::unique_ptr<AnnotationStore>(
+      new AnnotationStore(std::make_unique<Impl>(*std::move(database), options)));
 }
 
 AnnotationStore::AnnotationStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -219,19 +175,24 @@ std::uint64_t AnnotationStore::committed_sequence() const { return impl_->commit
 absl::Status AnnotationStore::failure() const { return impl_->failure(); }
 void AnnotationStore::Resume() { impl_->Resume(); }
 
-absl::Status AnnotationStore::Flush() {
-  std::mutex mutex;
-  std::condition_variable wake;
-  std::optional<absl::Status> result;
-  const absl::Status queued = SubmitBarrier([&](const absl::Status& status) {
-    const std::lock_guard guard(mutex);
-    result = status;
-    wake.notify_one();
+absl::Status AnnotationStore::Flush(std::chrono::milliseconds limit) {
+  struct Shared {  // outlives a caller who does not wait to the end
+    std::mutex mutex;
+    std::condition_variable wake;
+    std::optional<absl::Status> result;
+  };
+  const auto shared = std::make_shared<Shared>();
+  const absl::Status queued = SubmitBarrier([shared](const absl::Status& status) {
+    const std::lock_guard guard(shared->mutex);
+    shared->result = status;
+    shared->wake.notify_one();
   });
   if (!queued.ok()) return queued;
-  std::unique_lock guard(mutex);
-  wake.wait(guard, [&] { return result.has_value(); });
-  return *result;
+  std::unique_lock guard(shared->mutex);
+  if (!shared->wake.wait_for(guard, limit, [&] { return shared->result.has_value(); })) {
+    return absl::DeadlineExceededError("the disk does not answer");
+  }
+  return *shared->result;
 }
 
 }  // namespace saccade

@@ -3,6 +3,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -26,7 +27,10 @@ struct StoredAnnotations {
   std::vector<AnsweredRequest> requests;      // the last 10 000, oldest first
 };
 
-/// Annotations in DIR/annotations.sqlite: WAL, synchronous=FULL, one process at a time.
+/// Annotations in DIR/annotations.sqlite: WAL, synchronous=FULL, one process at a time, readable by
+/// their owner alone. Files that are deleted while it runs are written again, before the next
+/// change is answered and within a second or so in any case; another file in their place is left
+/// alone and changes are refused (FailedPrecondition).
 ///
 /// Submit queues; one thread commits all that is queued in one transaction and then calls back. If
 /// a transaction fails, every change queued so far fails with the same error and the store refuses
@@ -45,7 +49,7 @@ class AnnotationStore {
   /// Errors name the file and the remedy:
   ///   PermissionDenied    directory or file not writable
   ///   ResourceExhausted   no room on the disk
-  ///   DataLoss            not a database, or damaged
+  ///   DataLoss            not a database, damaged, or emptied (0 bytes)
   ///   FailedPrecondition  written by a newer version, or in use by another process
   static absl::StatusOr<std::unique_ptr<AnnotationStore>> Open(
       const std::filesystem::path& directory, const Options& options);
@@ -73,8 +77,9 @@ class AnnotationStore {
   /// with the error that hit it.
   absl::Status SubmitBarrier(Done done);
 
-  /// Waits until all that was queued before is committed or has failed.
-  absl::Status Flush();
+  /// Waits until all that was queued before is committed or has failed; DeadlineExceeded after
+  /// `limit`. Any thread.
+  absl::Status Flush(std::chrono::milliseconds limit = std::chrono::hours(1));
 
  private:
   class Impl;

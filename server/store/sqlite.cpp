@@ -105,6 +105,18 @@ absl::StatusOr<std::string> SqliteDatabase::Query(const char* sql) {
   return statement->Text(0);
 }
 
+absl::Status SqliteDatabase::CopyInto(const std::filesystem::path& file) {
+  absl::StatusOr<SqliteStatement> copy = Prepare("VACUUM INTO ?");
+  if (!copy.ok()) return copy.status();
+  copy->Bind(0, std::string_view(file.native()));
+  return copy->Run();
+}
+
+void SqliteDatabase::KeepFilesOnClose() {
+  int keep = 1;
+  sqlite3_file_control(db_, "main", SQLITE_FCNTL_PERSIST_WAL, &keep);
+}
+
 bool SqliteDatabase::InTransaction() const { return sqlite3_get_autocommit(db_) == 0; }
 
 absl::Status SqliteDatabase::Error(int code) const {

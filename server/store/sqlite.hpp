@@ -67,6 +67,11 @@ class SqliteDatabase {
   absl::Status Error(int code) const;
   bool InTransaction() const;
 
+  /// Writes all that this connection sees into `file`, which is empty. Outside a transaction.
+  absl::Status CopyInto(const std::filesystem::path& file);
+  /// Closing would delete the log and its index by their names, whosever they are by then.
+  void KeepFilesOnClose();
+
  private:
   SqliteDatabase(sqlite3* db, std::filesystem::path file) : db_(db), file_(std::move(file)) {}
 

@@ -7,6 +7,8 @@
 #include <toml.hpp>
 #include <variant>
 
+#include "shared/io/toml_file.hpp"
+
 namespace saccade {
 namespace {
 
@@ -149,13 +151,11 @@ absl::Status TrackerOptions::SetPair(absl::string_view pair) {
 }
 
 absl::Status TrackerOptions::LoadToml(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file)) {
-    return absl::NotFoundError(absl::StrCat(file.string(), ": no such file"));
-  }
+  const absl::StatusOr<toml::value> root = ParseTomlFile(file);
+  if (!root.ok()) return root.status();
   try {
-    const toml::value root = toml::parse(file.string());
-    if (!root.contains("tracker")) return absl::OkStatus();
-    for (const auto& [name, value] : toml::find(root, "tracker").as_table()) {
+    if (!root->contains("tracker")) return absl::OkStatus();
+    for (const auto& [name, value] : toml::find(*root, "tracker").as_table()) {
       std::string text;
       if (value.is_boolean()) text = value.as_boolean() ? "true" : "false";
       if (value.is_integer()) text = absl::StrCat(value.as_integer());

@@ -165,8 +165,12 @@ absl::Status CheckText(absl::string_view text, std::size_t max_bytes, absl::stri
   if (text.size() > max_bytes) {
     return Bad(field, absl::StrCat("at most ", max_bytes, " bytes, not ", text.size()));
   }
-  for (const char c : text) {
-    if (absl::ascii_iscntrl(static_cast<unsigned char>(c)) && c != '\n') {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(text[at]); };
+    // U+0080 to U+009F: the terminal's second set.
+    const bool second_set =
+        byte(i) == 0xc2 && i + 1 < text.size() && byte(i + 1) >= 0x80 && byte(i + 1) < 0xa0;
+    if (second_set || (absl::ascii_iscntrl(byte(i)) && text[i] != '\n')) {
       return Bad(field, "holds a control character");
     }
   }

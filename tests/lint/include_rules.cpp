@@ -20,7 +20,7 @@ constexpr auto kServerOrder = std::to_array<string_view>(
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder =
-    std::to_array<string_view>({"geometry", "time", "camera", "scene", "wire", "render"});
+    std::to_array<string_view>({"io", "geometry", "time", "camera", "scene", "wire", "render"});
 
 // Folders that see less than what is above them: only snapshots, packets and commands.
 struct Restriction {

@@ -23,7 +23,10 @@ void AttackTest::Begin(const TargetOptions& options) {
 void AttackTest::TearDown() {
   if (target_ == nullptr) return;
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();
-  EXPECT_EQ(target_->Unwell(), "");
+  // Twice more where the machine was late, not the server.
+  std::string unwell = target_->Unwell();
+  for (int i = 0; i < 2 && !unwell.empty() && target_->Alive(); ++i) unwell = target_->Unwell();
+  EXPECT_EQ(unwell, "");
   EXPECT_EQ(expert_->Verdict(), "");
   EXPECT_EQ(expert_->marks(), kMarks);
   const Received got = expert_->received();
@@ -51,6 +54,15 @@ void AttackTest::SendAll(const std::vector<HttpCase>& cases) {
     const bool wanted = std::find(one.wanted.begin(), one.wanted.end(), answer) != one.wanted.end();
     EXPECT_TRUE(wanted) << one.name << " got " << answer;
   }
+}
+
+long AttackTest::SteadyMemory() {
+  long before_kib = 0, now_kib = target_->vitals().rss_kib;
+  for (int i = 0; i < 10 && now_kib > before_kib + 2048; ++i) {
+    std::this_thread::sleep_for(seconds(2));
+    before_kib = std::exchange(now_kib, target_->vitals().rss_kib);
+  }
+  return now_kib;
 }
 
 int AttackTest::Participants() {

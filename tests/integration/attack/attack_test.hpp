@@ -22,6 +22,9 @@ class AttackTest : public ::testing::Test {
   void Run(milliseconds span, const std::function<void(const Battle&)>& attack);
   /// Sends each and demands that the server lives and that the answer is one of those wanted.
   void SendAll(const std::vector<HttpCase>& cases);
+  /// Waits until the server's own buffers (10 s of pictures) are full, so that what comes after is
+  /// the attack's doing; KiB held then.
+  long SteadyMemory();
   /// Participants in the server's own words; -1: no answer.
   int Participants();
   /// True if they are `count` before `limit` is over.

@@ -34,7 +34,7 @@ GoodExpert::GoodExpert(Target& target) {
   read_ = std::thread([this] { Read(); });
   acknowledge_ = std::thread([this] { Acknowledge(); });
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, seconds(20), [this] { return received_.poses > 0 || ended_; });
+  changed_.wait_for(lock, seconds(60), [this] { return received_.poses > 0 || ended_; });
 }
 
 GoodExpert::~GoodExpert() {

@@ -15,7 +15,7 @@ using Load = AttackTest;
 constexpr double kShare = 0.8;
 
 TEST_F(Load, ListsBesideEditsSeeWholeAnnotations) {
-  Run(seconds(30), [](const Battle& battle) { ListWhileOthersEdit(battle, 600, seconds(4)); });
+  Run(seconds(30), [](const Battle& battle) { ListWhileOthersEdit(battle, 600, seconds(8)); });
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();
   EXPECT_GE(tally_.of("annotations"), 500);
   EXPECT_GT(tally_.of("lists"), 100);

@@ -1,4 +1,5 @@
 // What is no HTTP, no gRPC-Web, no HTTP/2 and no message; and what never ends.
+#include "saccade/v1/annotation.pb.h"
 #include "tests/integration/attack/attack_test.hpp"
 
 namespace saccade::testing {
@@ -14,7 +15,8 @@ TEST_F(Malformed, GrpcWebIsRefused) { SendAll(GrpcWebCases(target_->http_port())
 
 TEST_F(Malformed, HttpIsRefused) { SendAll(HttpCases(target_->http_port())); }
 
-TEST_F(Malformed, Http2IsRefused) {
+TEST_F(Malformed, Http2IsRefusedAndNotKept) {
+  const long before_kib = SteadyMemory();
   for (const Http2Case& one : Http2Cases()) {
     Socket socket(target_->grpc_port());
     ASSERT_TRUE(socket.ok()) << one.name;
@@ -22,17 +24,27 @@ TEST_F(Malformed, Http2IsRefused) {
     tally_.Add(socket.ClosedByPeer(milliseconds(60)) ? "closed" : "held");
     ASSERT_TRUE(target_->Alive()) << one.name << ": " << target_->Obituary();
   }
+  const long grown_kib = target_->vitals().rss_kib - before_kib;
+  tally_.Add("KiB more in the end", grown_kib);
+  EXPECT_LT(grown_kib, 60 * 1024);
 }
 
 TEST_F(Malformed, MessagesFromDescriptorsEndNothing) {
   ASSERT_GE(MethodNames().size(), 30u);
+  v1::CreateAnnotationRequest request;
+  int sound = 0;
+  for (std::uint32_t seed = 0; seed < 100; ++seed) {
+    sound += request.ParseFromString(
+        FuzzedRequest("/saccade.v1.AnnotationService/Create", expert_->session_id(), seed));
+  }
+  ASSERT_EQ(sound, 100) << "requests that are messages";
   Run(seconds(6), FuzzMethods);
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();
   DeleteStrangersAnnotations(*target_);
 }
 
 TEST_F(Malformed, WhatNeverEndsIsNotKept) {
-  const long before_kib = target_->vitals().rss_kib;
+  const long before_kib = SteadyMemory();
   PeakMemory peak(target_->pid());
   Run(seconds(30), [](const Battle& battle) { SendEndlessHttp(battle, 200); });
   const long grown_kib = peak.kib() - before_kib;

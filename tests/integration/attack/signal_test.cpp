@@ -11,6 +11,7 @@
 #include "saccade/v1/annotation.pb.h"
 #include "saccade/v1/session.pb.h"
 #include "tests/integration/attack/attack_test.hpp"
+#include "tests/integration/support/small_dataset.hpp"
 
 namespace saccade::testing {
 namespace {
@@ -53,22 +54,18 @@ milliseconds SinceIn(Clock::time_point from) {
   return std::chrono::duration_cast<milliseconds>(Clock::now() - from);
 }
 
-// One life: start, wait (from the start, or from when it is ready), signal, end. Exit code 0;
-// 128 + n only before the server hears signals, that is before it is ready.
-void LiveAndDie(const std::string& data_dir, bool from_ready, milliseconds wait, int signal,
-                Tally& tally) {
-  Process process(LimitedServer({}, data_dir));
-  if (from_ready) {
-    ASSERT_TRUE(process.WaitForLine("\"ready\"", seconds(30)).has_value()) << process.err();
-  }
+// One life: start, wait, signal, end. Exit code 0; 128 + n only before the server hears signals,
+// that is before it is ready.
+void LiveAndDie(const TargetOptions& options, milliseconds wait, int signal, Tally& tally) {
+  Process process(LimitedServer(options, options.data_dir));
   std::this_thread::sleep_for(wait);
   const bool ready = process.WaitForLine("\"ready\"", milliseconds(0)).has_value();
   const auto from = Clock::now();
   process.Signal(signal);
   const std::optional<int> code = process.Wait(kEnd + kSlack);
   const std::string when = std::to_string(wait.count()) + " ms after the start" +
-                           (from_ready ? " of service" : "") + (ready ? ", ready" : ", not ready") +
-                           ", signal " + std::to_string(signal);
+                           (ready ? ", ready" : ", not ready") + ", signal " +
+                           std::to_string(signal);
   tally.Add(ready ? "signals when ready" : "signals before");
   if (!code) {
     ADD_FAILURE() << "still there " << SinceIn(from).count() << " ms after a signal: " << when;
@@ -89,12 +86,14 @@ TEST(Signals, EndItAtFiftyRandomMoments) {
     workers.emplace_back([w, &tally] {
       TemporaryFolder folder;
       PlaceThree(folder / "data");
+      WriteSmallDataset(folder / "set", {.frames = 60});
       std::mt19937 random(kSeed + static_cast<unsigned>(w));
       for (int i = 0; i < kSignals / kWorkers; ++i) {
-        const bool from_ready = i % 3 == 2;
-        const milliseconds wait(
-            std::uniform_int_distribution<int>(0, from_ready ? 200 : 800)(random));
-        LiveAndDie(folder / "data", from_ready, wait, random() % 2 == 0 ? SIGTERM : SIGINT, tally);
+        const milliseconds wait(std::uniform_int_distribution<int>(0, 800)(random));
+        TargetOptions options;  // the simulator takes its time to start, a data set none
+        if (i % 2 == 1) options.source = "dataset:" + (folder / "set");
+        options.data_dir = folder / "data";
+        LiveAndDie(options, wait, random() % 2 == 0 ? SIGTERM : SIGINT, tally);
       }
       TargetOptions options;
       options.data_dir = folder / "data";

@@ -46,7 +46,7 @@ std::vector<std::string> LimitedServer(const TargetOptions& options, const std::
 Target::Target(const TargetOptions& options)
     : process_(
           LimitedServer(options, options.data_dir.empty() ? folder_ / "data" : options.data_dir)) {
-  const std::optional<std::string> line = process_.WaitForLine("\"ready\"", seconds(30));
+  const std::optional<std::string> line = process_.WaitForLine("\"ready\"", seconds(90));
   if (!line) {
     std::fprintf(stderr, "saccade-server is not ready; it said: %s%s\n", process_.out().c_str(),
                  process_.err().c_str());

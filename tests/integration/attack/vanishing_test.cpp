@@ -74,8 +74,8 @@ TEST_F(Vanishing, WhoIsSilentFor40SecondsIsGone) {
 }
 
 TEST_F(Vanishing, ReadersOfAByteASecondHoldNobodyUp) {
+  const long before_kib = SteadyMemory();
   const double quiet_hz = expert_->PoseRate(seconds(2));
-  const long before_kib = target_->vitals().rss_kib;
   double hz = 0;
   long grown_kib = 0;
   Run(seconds(10), [&](const Battle& battle) {

@@ -1,11 +1,15 @@
 // What the server refuses to start on, and what it goes on without.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "tests/integration/bad_inputs/table.hpp"
 #include "tests/integration/support/small_dataset.hpp"
@@ -56,6 +60,21 @@ TEST_F(BadDataSet, ListIsRefusedWithFileLineAndRemedy) {
          [](const fs::path& p) { Write(p / "rgb.txt", "1.0\n"); });
   refuse("rgb.txt: 4 KiB of zeros", "rgb.txt",
          [](const fs::path& p) { Write(p / "rgb.txt", std::string(4096, '\0')); });
+  for (const char* name : {"rgb.txt", "camera.yaml", "target.yaml", "start.yaml"}) {
+    const std::string what = name;
+    refuse(what + ": a named pipe", what + ": is a named pipe", [&](const fs::path& p) {
+      fs::remove(p / name);
+      ASSERT_EQ(mkfifo((p / name).c_str(), 0600), 0);
+    });
+    refuse(what + ": /dev/zero", what + ": is a device", [&](const fs::path& p) {
+      fs::remove(p / name);
+      fs::create_symlink("/dev/zero", p / name);
+    });
+    refuse(what + ": 64 GiB of nothing", what, [&](const fs::path& p) {
+      Write(p / name, "");
+      fs::resize_file(p / name, std::uintmax_t{1} << 36);
+    });
+  }
 }
 
 TEST_F(BadDataSet, CameraIsRefusedWithFieldAndRemedy) {
@@ -80,6 +99,11 @@ TEST_F(BadDataSet, CameraIsRefusedWithFieldAndRemedy) {
          Camera("brown_conrady", "distortion: [0.1, 0.2, 0.3]\n"));
   refuse("infinite coefficient", "distortion",
          Camera("brown_conrady", "distortion: [.inf, 0, 0, 0, 0]\n"));
+  refuse("focal length 1e300", "fx",
+         "model: pinhole\nwidth: 320\nheight: 240\nfx: 1e300\nfy: 288\ncx: 160\ncy: 120\n");
+  refuse("focal length of a telescope", "field of view",
+         "model: pinhole\nwidth: 320\nheight: 240\nfx: 90000\nfy: 288\ncx: 160\ncy: 120\n");
+  refuse("100 000 open brackets", "camera.yaml", "fx: " + std::string(100'000, '['));
 }
 
 TEST_F(BadDataSet, TargetIsRefused) {
@@ -114,6 +138,45 @@ TEST_F(BadDataSet, BrokenPicturesAreSkippedCountedAndNamed) {
   Row("start", "pictures: one missing, one of 0 bytes, one cut in half, one of rubbish",
       "skipped and named on stderr; serves: " + std::string(IsWell(server) ? "yes" : "no"),
       named && IsWell(server) && !json.is_discarded());
+}
+
+// Before, under this limit: terminate called after throwing an instance of 'cv::Exception'.
+TEST_F(BadDataSet, APictureBombUnderAMemoryLimitIsSkipped) {
+  std::vector<std::string> arguments = Spoiled([](const fs::path& p) {
+    std::ifstream whole(p / "rgb" / "0.033333.png", std::ios::binary);
+    std::string png(std::istreambuf_iterator<char>(whole), {});
+    for (const std::size_t at : {16, 20}) png.replace(at, 4, std::string("\x00\x00\x75\x30", 4));
+    Write(p / "rgb" / "0.033333.png", png);
+    const cv::Mat large(6000, 6000, CV_8UC3, cv::Scalar(1, 2, 3));  // honest: 108 MB, and 36 grey
+    cv::imwrite((p / "rgb" / "0.066667.png").string(), large);
+  });
+  Server server(arguments);
+  rlimit limit{};  // little more than it has
+  std::ifstream statm("/proc/" + std::to_string(server.process().pid()) + "/statm");
+  std::size_t pages = 0;
+  statm >> pages;
+  limit.rlim_cur = limit.rlim_max = (pages * 4096) + (std::size_t{64} << 20);
+  prlimit(server.process().pid(), RLIMIT_AS, &limit, nullptr);
+  std::string err;
+  for (int i = 0; i < 100 && err.find("0.066667") == std::string::npos; ++i) {
+    server.process().Wait(std::chrono::milliseconds(50));
+    err = server.process().err();
+  }
+  Row("start", "pictures: one claims 30000 x 30000, one is 6000 x 6000, memory is limited",
+      "skipped and named: " + std::string(err.find("0.033333") != std::string::npos ? "yes" : "no"),
+      err.find("0.033333") != std::string::npos && err.find("0.066667") != std::string::npos &&
+          IsWell(server));
+}
+
+TEST_F(BadDataSet, PicturesThatCannotBeVideoAreRefused) {
+  fs::create_directories(folder_ / "wide/rgb");
+  cv::imwrite(folder_ / "wide/rgb/0.png", cv::Mat(64, 4400, CV_8UC1, cv::Scalar(9)));
+  Write(folder_ / "wide/rgb.txt", "0 rgb/0.png\n");
+  Write(folder_ / "wide/camera.yaml",
+        "model: pinhole\nwidth: 4400\nheight: 64\nfx: 1000\nfy: 1000\ncx: 2200\ncy: 32\n");
+  ExpectRefusedStart("pictures wider than the video coder takes",
+                     {"--source", "dataset:" + (folder_ / "wide"), "--data-dir", folder_ / "data"},
+                     1, "no video");
 }
 
 TEST_F(BadDataSet, PictureOfAnotherSizeIsSkipped) {
@@ -156,6 +219,31 @@ TEST(BadStart, ArgumentsAreRefusedByName) {
   Write(folder / "unknown.toml", "colour_of_the_sky = 3\n");
   refuse("--config with an unknown key", {"--source", source, "--config", folder / "unknown.toml"},
          2, "colour_of_the_sky");
+  refuse("--config is a folder", {"--source", source, "--config", folder.path()}, 2, "is a folder");
+  refuse("--config is /dev/zero", {"--source", source, "--config", "/dev/zero"}, 2, "is a device");
+  ASSERT_EQ(mkfifo((folder / "pipe.toml").c_str(), 0600), 0);
+  refuse("--config is a named pipe", {"--source", source, "--config", folder / "pipe.toml"}, 2,
+         "is a named pipe");
+  refuse("--config with a name of 5000 letters",
+         {"--source", source, "--config", std::string(5000, 'x')}, 2, "--config");
+  const std::string deep(100'000, '[');
+  for (const std::string& text :
+       {"source = " + deep, "source = " + deep + std::string(100'000, ']'), deep}) {
+    Write(folder / "deep.toml", text);
+    refuse("--config with 100 000 brackets", {"--source", source, "--config", folder / "deep.toml"},
+           2, "deep.toml");
+  }
+  Write(folder / "slow.toml", "[video]\nbit_rate_bit_s = 1\n");
+  refuse("video of 1 bit/s", {"--source", source, "--config", folder / "slow.toml"}, 2,
+         "50000 to 100000000");
+  Write(folder / "nan.toml", "[gaze]\nrate_deg_s = nan\n");
+  refuse("a setting that is NaN", {"--source", source, "--config", folder / "nan.toml"}, 1,
+         "rate_deg_s");
+  for (const char* time : {"1e30", "inf", "nan", "-1", "1e10"}) {
+    refuse(std::string("--run-for ") + time, {"--source", source, "--run-for", time}, 2,
+           "--run-for");
+  }
+  refuse("--camera is a folder", {"--source", source, "--camera", folder.path()}, 1, "is a folder");
 }
 
 TEST(BadStart, DataFolderAndPortsAreRefusedByName) {
@@ -173,6 +261,10 @@ TEST(BadStart, DataFolderAndPortsAreRefusedByName) {
     first.process().Signal(SIGTERM);
     ASSERT_EQ(first.process().Wait(std::chrono::seconds(5)), 0);
   }
+  fs::create_directories(folder / "emptied");
+  Write(folder / "emptied/annotations.sqlite", "");
+  ExpectRefusedStart("data base of 0 bytes", {"--source", source, "--data-dir", folder / "emptied"},
+                     1, "0 bytes");
   for (const auto& entry : fs::directory_iterator(folder / "data")) {
     if (entry.is_regular_file()) Write(entry.path(), std::string(8192, '\x5a'));
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -150,15 +151,73 @@ TEST_F(CommandLine, AnnotationIsPlacedShownDeletedAndBroughtBack) {
 }
 
 TEST_F(CommandLine, BadTargetsAreRefusedByName) {
-  ExpectFailure(Run({"annotate", "--pixel", "5000,10"}), "pixel.u");
-  ExpectFailure(Run({"annotate", "--point", "1e9,0,1"}), "point_in_world_m.x");
-  ExpectFailure(Run({"annotate", "--feature", "18446744073709551615"}), "feature");
+  ExpectFailure(Run({"annotate", "--pixel", "5000,10"}), "--pixel: u 5000 is outside the picture");
+  ExpectFailure(Run({"annotate", "--point", "1e9,0,1"}), "--point: x 1e+09 is beyond");
+  ExpectFailure(Run({"annotate", "--feature", "18446744073709551615"}),
+                "--feature: 18446744073709551615 is not in the map");
   ExpectFailure(Run({"annotate", "--pixel", "10,10", "--frame", "4000000000"}), "frame");
-  ExpectFailure(Run({"annotate", "--point", "0,0,1", "--text", std::string(501, 'x')}), "text");
+  ExpectFailure(Run({"annotate", "--point", "0,0,1", "--text", std::string(501, 'x')}),
+                "--text: at most 500 bytes, not 501");
+  ExpectFailure(Run({"annotate", "--pixel", "1,1", "--shape", "ink", "--stroke", "1,1,-9,1"}),
+                "--stroke: point 2, u -9 is outside");
+  ExpectFailure(Run({"--name", std::string(70, 'x'), "annotate", "--point", "0,0,1"}), "--name: ");
   ExpectFailure(Run({"annotations", "show", "ffffffff"}), "no annotation 'ffffffff'");
   ExpectFailure(
       Run({"snapshot", "--view", "raw", "--frame", "4000000000", "--out", *folder_ / "never.png"}),
       "frame");
+}
+
+TEST_F(CommandLine, ErrorsAreJsonWhereAnswersAre) {
+  const RunResult failed = Run({"--json", "annotate", "--pixel", "5000,10"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_EQ(failed.out, "");
+  const json problem = json::parse(failed.err, nullptr, /*allow_exceptions=*/false);
+  ASSERT_TRUE(problem.is_object()) << failed.err;
+  EXPECT_EQ(problem["error"]["code"], "INVALID_ARGUMENT");
+  EXPECT_THAT(problem["error"]["message"].get<std::string>(), ::testing::StartsWith("--pixel: u"));
+
+  const RunResult usage = Run({"annotate", "--json", "--pixel", "1"});
+  EXPECT_EQ(usage.exit_code, 2);
+  EXPECT_TRUE(json::parse(usage.err, nullptr, false)["error"]["message"].is_string()) << usage.err;
+  const RunResult nobody = Saccade({"--server", "127.0.0.1:1", "status", "--json"}, *folder_ / "s");
+  EXPECT_EQ(json::parse(nobody.err, nullptr, false)["error"]["code"], "UNAVAILABLE") << nobody.err;
+  EXPECT_EQ(Run({"annotate", "--point", "0,0,1", "--text", "\xff"}).exit_code, 2) << "not UTF-8";
+}
+
+TEST_F(CommandLine, UndoUnderAnotherNameLeavesOnesOwnMarks) {
+  const auto as = [](const std::string& name, std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"--name", name});
+    return Run(arguments);
+  };
+  const RunResult placed =
+      as("Ann", {"annotate", "--point", "0.1,0.1,1.5", "--shape", "arrow", "--json"});
+  ASSERT_EQ(placed.exit_code, 0) << placed.err;
+  const json mark = json::parse(placed.out, nullptr, false);
+  EXPECT_EQ(mark["author"], "Ann");
+  EXPECT_TRUE(mark["created_unix_ns"].is_string()) << "2^53 ns were over in April 1970";
+  ExpectFailure(as("Bob", {"annotations", "undo"}), "nothing to undo");
+  EXPECT_EQ(as("Bob", {"annotations", "show", mark["id"]}).exit_code, 0);
+  const RunResult undone = as("Ann", {"annotations", "undo"});
+  EXPECT_EQ(undone.exit_code, 0) << undone.err;
+  EXPECT_THAT(undone.out, HasSubstr("created arrow"));
+  EXPECT_EQ(as("Ann", {"annotations", "show", mark["id"]}).exit_code, 1);
+  for (const auto& file : std::filesystem::directory_iterator(*folder_ / "state" + "/saccade")) {
+    EXPECT_EQ(file.status().permissions() & std::filesystem::perms::all,
+              std::filesystem::perms::owner_read | std::filesystem::perms::owner_write)
+        << file.path();
+  }
+}
+
+TEST_F(CommandLine, AMapWithoutScaleHasNoMillimetres) {
+  const RunResult placed = Run({"annotate", "--point", "0.1,0.1,1.5", "--text", "größer"});
+  ASSERT_EQ(placed.exit_code, 0) << placed.err;
+  EXPECT_THAT(placed.out, HasSubstr("scale unknown"));
+  EXPECT_THAT(Run({"annotations"}).out, ::testing::Not(HasSubstr(" mm")));
+  const json all = RunJson({"annotations"});
+  ASSERT_FALSE(all.empty());
+  EXPECT_TRUE(all.back()["anchor"]["error_mm"].is_null());
+  EXPECT_EQ(all.back()["anchor"]["metric"], false);
+  EXPECT_EQ(Run({"annotations", "delete", all.back()["id"]}).exit_code, 0);
 }
 
 TEST_F(CommandLine, FilesThatCannotBeWrittenAreNamed) {

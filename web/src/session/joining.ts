@@ -10,6 +10,7 @@ import type { Role } from './types';
 export class Joining {
   name: string;
   private resumes: string; // the session to go on with; empty: none
+  private maybeShared: boolean;
   private readonly role: Role;
   private readonly kept: KeptSession | undefined;
   private readonly tabs: Tabs | undefined;
@@ -25,6 +26,7 @@ export class Joining {
   ) {
     ({ name: this.name, role: this.role, kept: this.kept, tabs: this.tabs } = options);
     this.resumes = this.kept?.recall(this.name) ?? '';
+    this.maybeShared = this.resumes !== '' && this.kept?.maybeShared === true;
   }
 
   /** A name belongs to a session: the next one is new. */
@@ -42,12 +44,13 @@ export class Joining {
   /** Once it is this tab's turn; `crowded` hears how many are before it while it is not. */
   async join(signal: AbortSignal, crowded: (tabs: number) => void): Promise<JoinResponse> {
     const { tabs } = this;
-    const asked = tabs?.ask(signal);
+    const asked = tabs?.ask(signal, this.maybeShared);
     let joined = await this.ask(this.resumes, signal);
     await asked; // usually done while the server answered
     await tabs?.turn(signal, crowded);
     // A duplicated tab has the same storage: the other one had the session first.
     if (this.resumes !== '' && tabs?.uses(this.resumes)) joined = await this.ask('', signal);
+    this.maybeShared = false;
     this.resumes = joined.sessionId;
     this.kept?.keep(joined.sessionId, this.name);
     tabs?.use(joined.sessionId);

@@ -12,6 +12,8 @@ export class KeptSession {
   constructor(
     private readonly storage: SessionStorage,
     role: Role,
+    /** True where another tab may go on with it: a duplicate begins with the storage of its model. */
+    readonly maybeShared = false,
   ) {
     this.key = `saccade.session.${role}`;
   }

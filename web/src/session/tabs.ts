@@ -16,6 +16,7 @@ export interface Channel {
 export const MAX_STREAMS = 4;
 
 const ANSWER_MS = 100;
+const SURE_MS = 1000; // a page that draws without a graphics card may be busy for some hundred
 const AGAIN_MS = 1000;
 
 /**
@@ -35,11 +36,11 @@ export class Tabs {
     channel.onmessage = ({ data }: MessageEvent<Said>) => this.hear(data);
   }
 
-  /** Asks who is there; what is known is complete once this resolves. */
-  async ask(signal: AbortSignal): Promise<void> {
+  /** Asks who is there; what is known is complete once this resolves. `sure`: with busy ones as well. */
+  async ask(signal: AbortSignal, sure = false): Promise<void> {
     this.others.clear();
     this.say('who');
-    await this.pause(ANSWER_MS, signal);
+    await this.pause(sure ? SURE_MS : ANSWER_MS, signal);
   }
 
   /** How many older ones there are; those that wait count as well, as they are before us. */
@@ -58,7 +59,7 @@ export class Tabs {
   async turn(signal: AbortSignal, told: (older: number) => void): Promise<void> {
     while (!this.mayStream) {
       told(this.older);
-      await this.pause(AGAIN_MS, signal);
+      await this.pause(AGAIN_MS, signal, true);
       if (signal.aborted) return;
       await this.ask(signal);
     }
@@ -93,7 +94,8 @@ export class Tabs {
     if (said.kind === 'who') this.say('here');
   }
 
-  private pause(ms: number, signal: AbortSignal): Promise<void> {
+  /** `wakes`: less, if a tab goes. */
+  private pause(ms: number, signal: AbortSignal, wakes = false): Promise<void> {
     return new Promise((resolve) => {
       const done = (): void => {
         clearTimeout(timer);
@@ -103,7 +105,7 @@ export class Tabs {
       };
       const timer = setTimeout(done, ms);
       signal.addEventListener('abort', done);
-      if (ms === AGAIN_MS) this.wake = done;
+      if (wakes) this.wake = done;
     });
   }
 }

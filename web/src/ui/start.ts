@@ -19,7 +19,7 @@ export function startPage(
   makePage: (session: Session, player: Player) => Page,
 ): void {
   const player = new Player();
-  const kept = new KeptSession(tabStorage(), options.role);
+  const kept = new KeptSession(tabStorage(), options.role, !reloaded());
   const tabs = new Tabs(new BroadcastChannel('saccade'), newUuid(), openedMs(tabStorage()));
   const session = new Session(createClients(location.origin), { ...options, kept, tabs }, player);
   player.attach(session);
@@ -43,8 +43,7 @@ const OPENED = 'saccade.opened';
 
 /** When this tab was opened: a reload keeps its place among the tabs of this browser. */
 function openedMs(storage: ReturnType<typeof tabStorage>): number {
-  const [entry] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
-  const kept = entry?.type === 'reload' ? Number(storage.getItem(OPENED)) : 0;
+  const kept = reloaded() ? Number(storage.getItem(OPENED)) : 0;
   const opened = kept > 0 ? kept : pageNowMs();
   try {
     storage.setItem(OPENED, String(opened));
@@ -52,4 +51,9 @@ function openedMs(storage: ReturnType<typeof tabStorage>): number {
     // Full: then a reload goes to the end of the queue.
   }
   return opened;
+}
+
+function reloaded(): boolean {
+  const [entry] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
+  return entry?.type === 'reload';
 }

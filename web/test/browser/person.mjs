@@ -136,7 +136,19 @@ async function typing(context) {
     left.join(' | '),
   );
 
+  // An input method takes Enter and Escape for itself while it composes.
   await expert.click(await placeIn(context, 0.5, 0.3));
+  const cdp = await expert.context.newCDPSession(expert.page);
+  const composed = { text: 'けんさ', selectionStart: 3, selectionEnd: 3 };
+  for (const key of ['Enter', 'Escape']) {
+    await cdp.send('Input.imeSetComposition', composed);
+    await expert.press(key);
+  }
+  const open = await editorOpen(context);
+  await cdp.send('Input.insertText', { text: '検査' });
+  const written = open ? await editorText(context) : 'no editor';
+  check('an input method is left alone', open && written.includes('検査'), `"${written}"`);
+  await expert.page.locator('.note-editor textarea').fill('');
   await expert.page.keyboard.type('only one');
   await expert.click(await placeIn(context, 0.3, 0.55));
   await sleep(2 * LATE_MS + 500);

@@ -51,6 +51,20 @@ describe('Tabs', () => {
     expect(late.older).toBe(MAX_STREAMS - 1);
   });
 
+  it('waits for a busy one, where it has to be sure', async () => {
+    ++room;
+    const { signal } = new AbortController();
+    const busy = new BroadcastChannel(`room ${room}`);
+    channels.push(busy);
+    const here = { kind: 'here', id: 'busy', sinceMs: 0, sessionId: 's1' };
+    busy.onmessage = () => setTimeout(() => busy.postMessage(here), 500);
+    const tab = openTab(5);
+    await tab.ask(signal);
+    expect(tab.uses('s1')).toBe(false);
+    await tab.ask(signal, true);
+    expect(tab.uses('s1')).toBe(true);
+  });
+
   it('knows that another tab goes on with a session', async () => {
     ++room;
     const { signal } = new AbortController();
@@ -107,7 +121,7 @@ describe('a session', () => {
     );
     const stop = new AbortController();
     const done = session.run(stop.signal);
-    await vi.waitFor(() => expect(session.live).toBe(true));
+    await vi.waitFor(() => expect(session.live).toBe(true), { timeout: 3000 });
     const leave = async () => {
       stop.abort();
       await done;
@@ -158,7 +172,7 @@ describe('a session', () => {
     ++room;
     const { clients, asked } = server();
     const storage = memory();
-    const kept = () => new KeptSession(storage, 'expert');
+    const kept = () => new KeptSession(storage, 'expert', true);
     const first = await run(clients, { kept: kept(), tabs: openTab(1) });
     const second = await run(clients, { kept: kept(), tabs: openTab(2) });
     expect([first.session.sessionId, second.session.sessionId]).toEqual(['s1', 's2']);

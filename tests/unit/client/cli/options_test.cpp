@@ -51,6 +51,9 @@ TEST(CommandLine, BadUsageEndsWithTwo) {
       {"annotations", "show"},
       {"annotations", "bogus"},
       {"watch", "--for", "-1"},
+      {"watch", "--for", "nan"},
+      {"annotate", "--pixel", "1,2", "--size", "nan"},
+      {"annotate", "--pixel", "1,2", "--text", "\xff"},
   };
   for (const auto& arguments : wrong) {
     const ParseResult result = Parse(arguments);

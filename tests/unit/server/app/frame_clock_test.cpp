@@ -22,6 +22,14 @@ TEST(FrameClock, ARecordingKeepsItsDistancesAndNeverComesFromTheFuture) {
   EXPECT_EQ(clock.ToMonotonic(recorded + 66 * kMs, 171 * kMs), 166 * kMs);
 }
 
+TEST(FrameClock, ARecordingThatStoodStillIsNotLateForEver) {
+  FrameClock clock;
+  const Timestamp recorded = 1'305'031'102'000 * kMs;
+  EXPECT_EQ(clock.ToMonotonic(recorded, 100 * kMs), 100 * kMs);
+  EXPECT_EQ(clock.ToMonotonic(recorded + 33 * kMs, 30'133 * kMs), 30'133 * kMs);  // 30 s of rest
+  EXPECT_EQ(clock.ToMonotonic(recorded + 66 * kMs, 30'170 * kMs), 30'166 * kMs);
+}
+
 TEST(FrameClock, WithoutPaceAFrameIsCapturedWhenItArrives) {
   FrameClock clock(/*paced=*/false);
   EXPECT_EQ(clock.ToMonotonic(33 * kMs, 9'000 * kMs), 9'000 * kMs);

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <fstream>
@@ -9,6 +10,7 @@
 namespace saccade {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 absl::StatusOr<std::optional<ServerConfig>> Parse(std::vector<std::string> arguments) {
@@ -32,7 +34,8 @@ std::string Error(const std::vector<std::string>& arguments) {
 
 // A file in the test's own folder.
 std::string Toml(const std::string& text) {
-  const std::string path = ::testing::TempDir() + "/saccade_config_test.toml";
+  const std::string path =
+      ::testing::TempDir() + "/saccade_config_test_" + std::to_string(getpid()) + ".toml";
   std::ofstream(path) << text;
   return path;
 }
@@ -109,6 +112,32 @@ TEST(ServerConfig, ABadFileIsNamedWithItsKey) {
   EXPECT_THAT(Error({"--config", Toml("[video]\nrate = 1")}), HasSubstr("video.rate"));
   EXPECT_THAT(Error({"--config", Toml("source = 4")}), HasSubstr("saccade_config_test.toml"));
   EXPECT_THAT(Error({"--config", Toml("source = ")}), HasSubstr("saccade_config_test.toml"));
+}
+
+TEST(ServerConfig, NumbersOutsideTheirRangeAreRefusedByName) {
+  for (const char* time : {"1e30", "inf", "-inf", "nan", "-0.1", "1e10", "1e999", "ten"}) {
+    EXPECT_THAT(Error({"--source", "sim:desk", "--run-for", time}), HasSubstr("--run-for")) << time;
+  }
+  EXPECT_EQ(Good({"--source", "sim:desk", "--run-for", "0"}).run_for_s, 0.0);
+  EXPECT_EQ(Good({"--source", "sim:desk", "--run-for", "1e9"}).run_for_s, 1e9);
+  for (const char* rate : {"1", "49999", "100000001", "-1", "-9223372036854775808"}) {
+    EXPECT_THAT(Error({"--source", "sim:desk", "--config",
+                       Toml("[video]\nbit_rate_bit_s = " + std::string(rate))}),
+                AllOf(HasSubstr("video.bit_rate_bit_s"), HasSubstr("50000 to 100000000")))
+        << rate;
+  }
+  EXPECT_THAT(Error({"--source", "sim:desk", "--config", Toml("seed = -1")}), HasSubstr("seed"));
+  for (const char* address : {"127.0.0.1:-1", "127.0.0.1:65536", "127.0.0.1:1e3", "127.0.0.1:"}) {
+    EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", address}), HasSubstr("--grpc")) << address;
+  }
+}
+
+TEST(ServerConfig, WhatIsNoConfigurationFileIsNamed) {
+  EXPECT_THAT(Error({"--config", "/tmp"}), AllOf(HasSubstr("/tmp"), HasSubstr("is a folder")));
+  EXPECT_THAT(Error({"--config", "/dev/zero"}), HasSubstr("is a device"));
+  EXPECT_THAT(Error({"--config", std::string(5000, 'x')}), HasSubstr("--config"));
+  EXPECT_THAT(Error({"--config", Toml("source = " + std::string(100'000, '['))}),
+              AllOf(HasSubstr("saccade_config_test.toml"), HasSubstr("nested")));
 }
 
 TEST(ServerConfig, VersionPrintsAndGivesNothing) {

@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "shared/io/log.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
 namespace saccade {
@@ -68,8 +69,10 @@ TEST_F(Dataset, BadPicturesAreSkippedCountedAndKeepTheirId) {
   Write("rgb/3.jpg", "not a picture");
   Write("rgb/4.png", "");
   auto source = Open();
+  FlushLog(std::chrono::seconds(5));  // of the tests before
   testing::internal::CaptureStderr();
   EXPECT_THAT(Ids(*source), ElementsAre(5));
+  FlushLog(std::chrono::seconds(5));
   const std::string said = testing::internal::GetCapturedStderr();
   EXPECT_EQ(source->bad_frames(), 5);
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 5) << said;

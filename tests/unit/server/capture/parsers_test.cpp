@@ -1,4 +1,5 @@
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include "server/capture/camera_file.hpp"
 #include "server/capture/image_list.hpp"
@@ -79,6 +80,92 @@ TEST_F(Parsers, CameraErrorsNameFileLineFieldAndRemedy) {
   EXPECT_THAT(CameraError("model: [unclosed"), HasSubstr("not valid YAML"));
   EXPECT_THAT(CameraError("just words"), HasSubstr("key: value"));
   EXPECT_THAT(CameraError(""), HasSubstr("key: value"));
+}
+
+TEST_F(Parsers, CameraMustBePossible) {
+  const std::string good = kCamera;
+  const auto refuse = [&](const std::string& from, const std::string& to, const char* field,
+                          const char* words) {
+    EXPECT_THAT(CameraError(Replaced(good, from, to)), AllOf(HasSubstr(field), HasSubstr(words)))
+        << to;
+  };
+  refuse("fx: 60", "fx: 1e300", "camera.yaml:4: fx", "up to 1e+06");
+  refuse("fx: 60", "fx: 1e-300", ":4: fx", "field of view of 180 deg");
+  refuse("fx: 60", "fx: 9000", ":4: fx", "field of view of 0.407");
+  refuse("fy: 60", "fy: 0.5", ":5: fy", "field of view");
+  refuse("fy: 60", "fy: 600", ":5: fy", "nearly square");
+  refuse("cx: 32", "cx: 129", ":6: cx", "from -64 up to 128");
+  refuse("cy: 24", "cy: -1e9", ":7: cy", "out of range");
+  refuse("width: 64", "width: 100000", ":2: width", "up to 8192");
+  refuse("width: 64\nheight: 48", "width: 8192\nheight: 8192", ":2: width", "33554432");
+  refuse("fps: 100", "fps: 0", ":9: fps", "from 0.1 up to 1000");
+  refuse("fps: 100", "fps: 1e300", ":9: fps", "from 0.1 up to 1000");
+  refuse("fps: 100", "fps: 100\nrolling_shutter_readout_s: 0.5", ":10: rolling_shutter_readout_s",
+         "longer than a frame");
+  refuse("fps: 100", "fps: 100\nrolling_shutter_readout_s: -0.1", "rolling_shutter_readout_s",
+         "from 0");
+  refuse("[0.1, 0, 0, 0, 0]", "[1e300, 0, 0, 0, 0]", ":8: distortion", "out of range");
+  refuse("[0.1, 0, 0, 0, 0]", "[-90000, 0, 0, 0, 0]", ":8: distortion", "inverted");
+  refuse("fps: 100", "T_body_camera: [1e9, 0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]", "T_body_camera",
+         "out of range");
+  // A fisheye's focal length is pixels a radian.
+  const std::string fisheye = Replaced(Replaced(good, "brown_conrady", "kannala_brandt"),
+                                       "[0.1, 0, 0, 0, 0]", "[0, 0, 0, 0]");
+  EXPECT_EQ(CameraError(Replaced(Replaced(fisheye, "fx: 60", "fx: 22"), "fy: 60", "fy: 22")), "");
+  EXPECT_THAT(CameraError(Replaced(Replaced(fisheye, "fx: 60", "fx: 9"), "fy: 60", "fy: 9")),
+              HasSubstr("fx"));
+}
+
+TEST_F(Parsers, PlacesMustBePossible) {
+  EXPECT_THAT(TargetError("type: chessboard\ncolumns: 9\nrows: 6\nsquare_m: 1e300\n"),
+              AllOf(HasSubstr("target.yaml:4: square_m"), HasSubstr("up to 10")));
+  EXPECT_THAT(TargetError("type: patches\npoints:\n"
+                          "  - {id: 0, point_in_world_m: [0, 1e300, 0], template: p.pgm}\n"),
+              HasSubstr("point_in_world_m: 1e+300 is out of range"));
+  Write("start.yaml",
+        "position_m: [0, 0, 1e99]\nposition_sigma_m: 0.02\norientation_xyzw: [0, 0, 0, 1]\n"
+        "orientation_sigma_rad: 0\n");
+  EXPECT_THAT(LoadStart(folder_ / "start.yaml").status().message(),
+              HasSubstr("position_m: 1e+99 is out of range"));
+}
+
+TEST_F(Parsers, DeepNestingIsRefusedInWords) {
+  const int n = 100'000;
+  std::string block;
+  for (int i = 0; i < 1000; ++i) block += std::string(static_cast<std::size_t>(i), ' ') + "a:\n";
+  for (const std::string& text : std::vector<std::string>{
+           "fx: " + std::string(n, '['), "fx: " + std::string(n, '[') + std::string(n, ']'),
+           "fx: " + std::string(n, '{'), std::string(n, '['), "- " + std::string(n, '-'), block,
+           "fx: &a [*a, *a, *a]", std::string(n, '?') + " a"}) {
+    EXPECT_THAT(CameraError(text), HasSubstr("camera.yaml")) << text.substr(0, 30);
+  }
+}
+
+TEST_F(Parsers, OnlyRegularFilesOfASensibleSizeAreRead) {
+  for (const char* name : {"camera.yaml", "rgb.txt", "target.yaml", "start.yaml"}) {
+    const auto load = [&] {
+      const std::filesystem::path file = folder_ / name;
+      const std::string kind = name;
+      if (kind == "camera.yaml") return LoadCamera(file).status();
+      if (kind == "rgb.txt") return LoadImageList(file).status();
+      if (kind == "target.yaml") return LoadTarget(file).status();
+      return LoadStart(file).status();
+    };
+    std::filesystem::remove(folder_ / name);
+    ASSERT_EQ(mkfifo((folder_ / name).c_str(), 0600), 0);
+    EXPECT_THAT(load().message(), AllOf(HasSubstr(name), HasSubstr("is a named pipe")));
+    std::filesystem::remove(folder_ / name);
+    std::filesystem::create_symlink("/dev/zero", folder_ / name);
+    EXPECT_THAT(load().message(), AllOf(HasSubstr(name), HasSubstr("is a device")));
+    std::filesystem::remove(folder_ / name);
+    std::filesystem::create_directory(folder_ / name);
+    EXPECT_THAT(load().message(), AllOf(HasSubstr(name), HasSubstr("is a folder")));
+    std::filesystem::remove(folder_ / name);
+    Write(name, "");
+    std::filesystem::resize_file(folder_ / name, std::uintmax_t{1} << 36);
+    EXPECT_THAT(load().message(), AllOf(HasSubstr(name), HasSubstr("too long")));
+    std::filesystem::remove(folder_ / name);
+  }
 }
 
 TEST_F(Parsers, ImageListErrorsNameTheLine) {

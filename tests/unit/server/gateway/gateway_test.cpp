@@ -220,8 +220,8 @@ TEST_F(GatewayTest, ChunkedRequestsAreTaken) {
 // 64 KiB in one trailer used to throw through the gateway's thread.
 TEST_F(GatewayTest, TrailersAndChunkHeadsHaveTheHeadsLimit) {
   const std::string endless(1 << 16, 'x');
-  for (const auto& rest : std::vector<std::string>
-       {"0\r\nX: " + endless + "\r\n\r\n", "1;" + endless, "0\r\n" + endless, endless}) {
+  for (const auto& rest : std::vector<std::string>{"0\r\nX: " + endless + "\r\n\r\n",
+                                                   "1;" + endless, "0\r\n" + endless, endless}) {
     HttpClient client(port());
     client.Send(ChunkedHead() + rest);
     const int status = client.ReadReply().status;

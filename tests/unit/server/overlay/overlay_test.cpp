@@ -248,6 +248,8 @@ TEST(Overlay, AllFiveHundredBytesOfTheNoteInTheMiddleAreInThePicture) {
   const int whole = draw(0.25, 0.25);
   EXPECT_GT(whole, 150) << "wearers who turn to it can read all of it";
   EXPECT_LT(whole, 300) << "and still see what they do";
+  notes = {notes[4]};
+  EXPECT_LT(draw(0, 0), 100) << "alone, but nobody looks at it";
 }
 
 TEST(Overlay, ALabelIsInThePictureAsAWholeAndBesideItsMark) {

@@ -143,7 +143,9 @@ TEST(SessionTable, NamesAreOneLineThatTurnsNothingAbout) {
   SessionTable sessions;
   v1::JoinRequest request;
   for (const char* name : {"Ann\n2026-11-29T00:00:00Z rpc Delete", "a\rb", "\x1b[2J",
-                           "a\xe2\x80\xaez", "a\xe2\x80\xa8z", "a\xe2\x81\xa6z", "a\xc2\x85z"}) {
+                           "a\xe2\x80\xaez", "a\xe2\x80\xa8z", "a\xe2\x81\xa6z", "a\xc2\x85z",
+                           "a\xc2\x9b"
+                           "31m"}) {
     request.set_display_name(name);
     EXPECT_THAT(std::string(sessions.Join(request).status().message()),
                 ::testing::StartsWith("display_name: "));

@@ -2,10 +2,13 @@
 
 #include <sys/mount.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <fstream>
+#include <functional>
 #include <mutex>
 #include <optional>
+#include <thread>
 
 #include "tests/unit/server/anchors/rig.hpp"
 #include "tests/unit/server/store/store_fixture.hpp"
@@ -32,12 +35,17 @@ class Answer {
       wake_.notify_one();
     };
   }
-  absl::StatusOr<T> Get() {
-    std::unique_lock guard(mutex_);
-    if (!wake_.wait_for(guard, std::chrono::seconds(10), [this] { return answer_.has_value(); })) {
-      return absl::DeadlineExceededError("no answer");
+  /// Calls `settle` now and then, as the tracker thread does.
+  absl::StatusOr<T> Get(const std::function<void()>& settle = [] {}) {
+    for (int i = 0; i < 1000; ++i) {
+      {
+        std::unique_lock guard(mutex_);
+        const auto there = [this] { return answer_.has_value(); };
+        if (wake_.wait_for(guard, std::chrono::milliseconds(10), there)) return *answer_;
+      }
+      settle();
     }
-    return *answer_;
+    return absl::DeadlineExceededError("no answer");
   }
 
  private:
@@ -67,7 +75,7 @@ class BookTest : public StoreTest {
     draft.text = text;
     draft.target = PointTarget{{0, 0, 2}};
     book_->Create(draft, "s", answer.Take());
-    return answer.Get();
+    return answer.Get([this] { book_->Settle(); });
   }
 
   /// How many were answered with success before one was refused.
@@ -145,13 +153,65 @@ TEST_F(BookTest, NothingClaimsToBeSavedOnAFullDisk) {
   options.max_bytes = 20 * 4096;
   Start(options);
   const std::size_t saved = CreateUntilFull();
-  Show();
-  EXPECT_EQ(book_->Latest()->size(), saved) << "the unsaved one is gone from memory";
+  EXPECT_EQ(book_->Latest()->size(), saved)
+      << "the unsaved one is gone from memory before its refusal is heard";
   EXPECT_EQ(Create("once more", std::string(400, 'x')).status().code(),
             absl::StatusCode::kResourceExhausted);
   Start();
   EXPECT_EQ(book_->Latest()->size(), saved);
   EXPECT_TRUE(Create("once more").ok()) << "a refused request is not remembered as done";
+}
+
+TEST_F(BookTest, ARefusalIsHeardOnlyWhenMemoryIsWhatTheDiskHas) {
+  AnnotationStore::Options options;
+  options.max_bytes = 20 * 4096;
+  Start(options);
+  const std::size_t saved = CreateUntilFull();
+  std::atomic<int> woken = 0;
+  book_.reset();
+  auto store = AnnotationStore::Open(directory_, options);
+  ASSERT_TRUE(store.ok());
+  auto book = AnnotationBook::Open(
+      RigOptions(), [this](FrameId id) { return ring_.Find(id); }, nullptr, *std::move(store),
+      [&woken] { ++woken; });
+  ASSERT_TRUE(book.ok());
+  book_ = *std::move(book);
+  Show();
+  std::atomic<std::size_t> listed = 0;
+  std::atomic<bool> answered = false;
+  AnnotationDraft draft;
+  draft.text = std::string(400, 'x');
+  draft.target = PointTarget{{0, 0, 2}};
+  book_->Create(draft, "s", [&](const absl::StatusOr<Annotation>& answer) {
+    EXPECT_FALSE(answer.ok());
+    listed = book_->Latest()->size();  // what a client lists who was just refused
+    answered = true;
+  });
+  for (int i = 0; i < 1000 && woken == 0; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(woken, 1) << "the tracker is woken, with or without a frame";
+  EXPECT_FALSE(answered) << "memory still has what the disk has not";
+  book_->Settle();
+  EXPECT_TRUE(answered);
+  EXPECT_EQ(listed, saved);
+}
+
+TEST_F(BookTest, AnEditThatFailsWhileItEndsIsAnsweredToo) {
+  AnnotationStore::Options options;
+  options.max_bytes = 20 * 4096;
+  Start(options);
+  CreateUntilFull();
+  int answers = 0;
+  AnnotationDraft draft;
+  draft.text = std::string(400, 'x');
+  draft.target = PointTarget{{0, 0, 2}};
+  book_->Create(draft, "s", [&](const absl::StatusOr<Annotation>& answer) {
+    EXPECT_FALSE(answer.ok());
+    ++answers;
+  });
+  book_.reset();
+  EXPECT_EQ(answers, 1);
 }
 
 TEST_F(BookTest, WorksAgainOnceThereIsRoomWithoutARestart) {
