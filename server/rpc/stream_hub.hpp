@@ -141,8 +141,14 @@ class StreamHub : public EventSink {
   EngineStatistics statistics_;
   std::shared_ptr<const v1::PresenceEvent> presence_;
   std::optional<std::uint64_t> end_frames_;
-  ChangeLog log_;           // the hub's thread
-  Runner<Message> runner_;  // last: its thread uses everything above
+  Pending pending_;
+  bool presence_changed_ = false;
+  const std::shared_ptr<EventBytes> bytes_ = std::make_shared<EventBytes>();
+  // The hub's thread.
+  ChangeLog log_;
+  Timestamp presence_ns_ = 0;  // when it was last told
+  std::size_t first_ = 0;      // which stream is next to be first
+  Runner<Wake> runner_;        // last: its thread uses everything above
 };
 
 }  // namespace saccade

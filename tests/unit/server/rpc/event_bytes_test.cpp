@@ -31,12 +31,12 @@ TEST(EventBytes, SubscribersShareWhatTheyGetAlike) {
   Subscription one(Everything(), bytes), other(Everything(), bytes);
   ChangeLog log;
   for (FrameId id = 0; id < 3; ++id) {
-    TrackedEvent tracked = MakeTracked(id, 1000);
+    TrackedEvent tracked = MakeTracked(id);
     auto snapshot = std::make_shared<MapSnapshot>(*tracked.snapshot);
     snapshot->features[0].point_in_world.x() = static_cast<double>(id);
     tracked.snapshot = snapshot;
     const NumberedState state = log.Next(tracked, 0);
-    const auto packet = MakePacket(id, id == 0);
+    const auto packet = MakePacket(id, id == 0, 1000);
     for (Subscription* subscription : {&one, &other}) {
       subscription->Offer(state);
       subscription->Offer(packet);
@@ -55,7 +55,7 @@ TEST(EventBytes, SubscribersShareWhatTheyGetAlike) {
       EXPECT_EQ(event.access_unit().frame_id(), id);
       EXPECT_EQ(event.access_unit().data(), "data");
       EXPECT_EQ(event.access_unit().stages().queued_ns(), 7) << "each stream's own";
-      EXPECT_EQ(event.access_unit().stages().captured_ns(), 1000) << "beside what is shared";
+      EXPECT_EQ(event.access_unit().stages().encoded_ns(), 1000) << "beside what is shared";
     }
     EXPECT_EQ(pictures, 1);
   }
