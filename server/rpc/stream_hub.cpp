@@ -41,7 +41,9 @@ void StreamHub::OnTracked(const TrackedEvent& event) {
 
 void StreamHub::OnVideo(const std::shared_ptr<const VideoPacket>& packet) {
   Leave([&](Pending& pending) {
-    pending.video[static_cast<std::size_t>(packet->view)].Push(packet);
+    const auto view = static_cast<std::size_t>(packet->view);
+    if (packet->key_frame) key_frames_[view].Made();
+    pending.video[view].Push(packet);
   });
 }
 
@@ -126,8 +128,28 @@ StreamHub::Round StreamHub::Prepare() {
   return round;
 }
 
+void StreamHub::AskForKeyFrame(VideoView view) {
+  {
+    const std::lock_guard lock(mutex_);
+    key_frames_[static_cast<std::size_t>(view)].Ask();
+  }
+  GrantKeyFrames(MonotonicNow());
+}
+
+void StreamHub::GrantKeyFrames(Timestamp now_ns) {
+  for (int view = 0; view < kVideoViews; ++view) {
+    bool granted = false;
+    {
+      const std::lock_guard lock(mutex_);
+      granted = key_frames_[static_cast<std::size_t>(view)].Grant(now_ns);
+    }
+    if (granted) backend_->RequestKeyFrame(static_cast<VideoView>(view));
+  }
+}
+
 void StreamHub::GoRound() {
   const Round round = Prepare();
+  GrantKeyFrames(MonotonicNow());                          // what had to wait
   if (round.statistics) AbandonTheSilent(MonotonicNow());  // once a second
   const std::vector<std::shared_ptr<Subscriber>> streams = Streams();
   if (streams.empty()) return;

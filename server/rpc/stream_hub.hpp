@@ -15,6 +15,7 @@
 #include "server/pipeline/runner.hpp"
 #include "server/rpc/backend.hpp"
 #include "server/rpc/event_bytes.hpp"
+#include "server/rpc/key_frame_requests.hpp"
 #include "server/rpc/packet_backlog.hpp"
 #include "server/rpc/session_table.hpp"
 #include "server/rpc/subscription.hpp"
@@ -95,6 +96,8 @@ class StreamHub : public EventSink {
   /// NotFound: the session has no stream.
   absl::Status Acknowledge(const std::string& session_id, std::uint64_t sequence,
                            bool request_key_frame);
+  /// A stream needs a key frame of `view`; requests are joined. Any thread.
+  void AskForKeyFrame(VideoView view);
   /// Ends every stream and takes no more.
   void CloseAll(const absl::Status& status);
 
@@ -123,6 +126,7 @@ class StreamHub : public EventSink {
   void Leave(Change change);
   void GoRound();
   Round Prepare();
+  void GrantKeyFrames(Timestamp now_ns);
   void AbandonTheSilent(Timestamp now_ns);
   /// False: closed. `replaced` is the stream that the same session had.
   bool Insert(const std::shared_ptr<Subscriber>& subscriber, std::shared_ptr<Subscriber>& replaced);
@@ -143,6 +147,7 @@ class StreamHub : public EventSink {
   std::optional<std::uint64_t> end_frames_;
   Pending pending_;
   bool presence_changed_ = false;
+  std::array<KeyFrameRequests, kVideoViews> key_frames_;
   const std::shared_ptr<EventBytes> bytes_ = std::make_shared<EventBytes>();
   // The hub's thread.
   ChangeLog log_;

@@ -48,7 +48,7 @@ void StreamWriter::Pump() {
   // Outside the lock: gRPC may run OnWriteDone before StartWrite returns. Nothing else touches
   // event_ or finishes the call while writing_ is set.
   if (write) StartWrite(&event_);
-  if (ask) hub_.backend()->RequestKeyFrame(view());
+  if (ask) hub_.AskForKeyFrame(view());
 }
 
 void StreamWriter::Close(const absl::Status& status) {

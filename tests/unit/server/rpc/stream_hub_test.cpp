@@ -70,7 +70,7 @@ class Client : public Subscriber {
       }
       if (event.has_presence()) ++presences;
     }
-    if (subscription_.WantsKeyFrame(MonotonicNow())) hub_.backend()->RequestKeyFrame(view());
+    if (subscription_.WantsKeyFrame(MonotonicNow())) hub_.AskForKeyFrame(view());
   }
   void Close(const absl::Status&) override {}
   void Abandon(const absl::Status&) override {}
@@ -168,6 +168,35 @@ TEST_F(Hub, WhoComesAndGoesIsToldFourTimesASecond) {
   EXPECT_GT(joined, 40);
   EXPECT_GE(clients_[0]->presences, 2);
   EXPECT_LE(clients_[0]->presences, 9) << joined << " came and went";
+}
+
+TEST_F(Hub, KeyFramesServeAllWhoAskAndAreOneASecondAtLast) {
+  const auto asked_within = [this](std::chrono::milliseconds time) {
+    const int before = rest_.key_frames_asked;
+    const auto begin = std::chrono::steady_clock::now();
+    while (std::chrono::steady_clock::now() - begin < time) {
+      hub_.AskForKeyFrame(VideoView::kRaw);
+      std::this_thread::sleep_for(1ms);
+    }
+    return rest_.key_frames_asked - before;
+  };
+  hub_.AskForKeyFrame(VideoView::kRaw);
+  EXPECT_EQ(rest_.key_frames_asked, 1) << "at once";
+  EXPECT_GE(asked_within(1s), 2);
+  EXPECT_LE(asked_within(3s), 6);
+  EXPECT_GE(rest_.key_frames_asked, 5);
+  EXPECT_LE(rest_.key_frames_asked, 9);
+}
+
+// Who asked has got it with the one that was coded meanwhile.
+TEST_F(Hub, AKeyFrameThatCameAnswersWhatWasAsked) {
+  hub_.AskForKeyFrame(VideoView::kRaw);
+  hub_.AskForKeyFrame(VideoView::kRaw);
+  hub_.OnVideo(MakePacket(0, true));
+  std::this_thread::sleep_for(300ms);
+  hub_.OnTracked(MakeTracked(1));
+  std::this_thread::sleep_for(100ms);
+  EXPECT_EQ(rest_.key_frames_asked, 1);
 }
 
 TEST_F(Hub, AcknowledgingFindsItsStream) {
