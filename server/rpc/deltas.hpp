@@ -29,6 +29,8 @@ struct ReadPosition {
   bool IsUpTo(ChangeNumber newest) const {
     return content == newest && estimate == newest && removal == newest && round_at == 0;
   }
+  bool IsComplete() const { return started && IsUpTo(content); }
+  friend bool operator==(const ReadPosition&, const ReadPosition&) = default;
 };
 
 /// One subscriber's map; turns a state into what it lacks.
@@ -38,6 +40,10 @@ class MapReader {
   /// are others; false if there is nothing worth sending. The first part of a subscription, and of
   /// a new map, is `full`.
   bool Next(const NumberedState& state, v1::MapDelta& delta);
+
+  /// Whether it has some state whole. Equal readers get the same from Next.
+  bool complete() const { return at_.IsComplete(); }
+  friend bool operator==(const MapReader&, const MapReader&) = default;
 
  private:
   ReadPosition at_;
@@ -49,6 +55,9 @@ class MapReader {
 class AnnotationReader {
  public:
   bool Next(const NumberedState& state, v1::AnnotationEvent& delta);
+
+  bool complete() const { return at_.IsComplete(); }
+  friend bool operator==(const AnnotationReader&, const AnnotationReader&) = default;
 
  private:
   ReadPosition at_;

@@ -15,7 +15,7 @@ grpc::ServerUnaryReactor* Finish(grpc::ServerUnaryReactor* reactor, const absl::
 }
 
 // A stream that cannot start.
-class RefusedStream final : public grpc::ServerWriteReactor<v1::Event> {
+class RefusedStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
  public:
   explicit RefusedStream(const absl::Status& status) { Finish(ToGrpc(status)); }
 
@@ -47,12 +47,17 @@ grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* cont
   return Finish(reactor, absl::OkStatus());
 }
 
-grpc::ServerWriteReactor<v1::Event>* SessionService::Subscribe(
-    grpc::CallbackServerContext* context, const v1::SubscribeRequest* request) {
+grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::Subscribe(
+    grpc::CallbackServerContext* context, const grpc::ByteBuffer* encoded) {
+  v1::SubscribeRequest request;
+  grpc::ByteBuffer buffer = *encoded;  // the same bytes: reading one empties it
+  if (!grpc::SerializationTraits<v1::SubscribeRequest>::Deserialize(&buffer, &request).ok()) {
+    return new RefusedStream(absl::InvalidArgumentError("request: is no SubscribeRequest"));
+  }
   const absl::StatusOr<Session> session =
-      gate_.Member(*context, Toll::kSubscribe, request->session_id());
+      gate_.Member(*context, Toll::kSubscribe, request.session_id());
   if (!session.ok()) return new RefusedStream(session.status());
-  const absl::StatusOr<SubscriptionOptions> options = SubscriptionOptions::FromProto(*request);
+  const absl::StatusOr<SubscriptionOptions> options = SubscriptionOptions::FromProto(request);
   Audit("Subscribe", session->participant_id, options.status());
   if (!options.ok()) return new RefusedStream(options.status());
   return StreamWriter::Open(hub_, *session, *options, *context, gate_.sessions().Hold(session->id));

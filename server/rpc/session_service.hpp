@@ -9,8 +9,17 @@
 
 namespace saccade {
 
+/// The service with a stream of encoded events: what many subscribers are sent is encoded once.
+using SessionServiceBase =
+    v1::SessionService::WithCallbackMethod_Join<v1::SessionService::WithRawCallbackMethod_Subscribe<
+        v1::SessionService::WithCallbackMethod_Acknowledge<
+            v1::SessionService::WithCallbackMethod_Ping<
+                v1::SessionService::WithCallbackMethod_GetFrame<
+                    v1::SessionService::WithCallbackMethod_GetStatus<
+                        v1::SessionService::Service>>>>>>;
+
 /// Joining, the stream, stills, clock. Handlers run on gRPC's threads and never block.
-class SessionService final : public v1::SessionService::CallbackService {
+class SessionService final : public SessionServiceBase {
  public:
   SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gate);
 
@@ -18,8 +27,8 @@ class SessionService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context,
                                  const v1::JoinRequest* request,
                                  v1::JoinResponse* response) override;
-  grpc::ServerWriteReactor<v1::Event>* Subscribe(grpc::CallbackServerContext* context,
-                                                 const v1::SubscribeRequest* request) override;
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* Subscribe(grpc::CallbackServerContext* context,
+                                                        const grpc::ByteBuffer* request) override;
   grpc::ServerUnaryReactor* Acknowledge(grpc::CallbackServerContext* context,
                                         const v1::AcknowledgeRequest* request,
                                         v1::AcknowledgeResponse* response) override;

@@ -4,54 +4,57 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace saccade {
 namespace {
 
-// Messages that may wait for the hub's thread: two seconds of everything. A video packet that falls
-// out is noticed by its sequence number and costs a key frame.
-constexpr std::size_t kBacklog = 256;
+// Who came and went is told at most so often: each telling names everybody to everybody.
+constexpr Timestamp kPresenceInterval = 250'000'000;
 
 }  // namespace
 
 StreamHub::StreamHub(Timestamp silence_ns)
     : silence_ns_(silence_ns),
       presence_(std::make_shared<v1::PresenceEvent>()),
-      runner_({.capacity = kBacklog, .when_full = WhenFull::kDropOldest},
-              [this](const Message& message) { Distribute(message); }) {}
+      runner_({.capacity = 1, .when_full = WhenFull::kDropOldest}, [this](Wake) { GoRound(); }) {}
 
 StreamHub::~StreamHub() { runner_.Stop(); }
 
-void StreamHub::OnTracked(const TrackedEvent& event) {
+template <typename Change>
+void StreamHub::Leave(Change change) {
   {
     const std::lock_guard lock(mutex_);
-    newest_ = event;
+    change(pending_);
   }
-  runner_.Post(event).IgnoreError();  // stopped: nobody is left to hear it
+  runner_.Post(Wake()).IgnoreError();  // stopped: nobody is left to hear it
+}
+
+void StreamHub::OnTracked(const TrackedEvent& event) {
+  Leave([&](Pending& pending) {
+    if (pending.tracked && pending.tracked->snapshot != event.snapshot) {
+      ++pending.frames_passed_over;
+    }
+    newest_ = pending.tracked = event;
+  });
 }
 
 void StreamHub::OnVideo(const std::shared_ptr<const VideoPacket>& packet) {
-  runner_.Post(packet).IgnoreError();
+  Leave([&](Pending& pending) {
+    pending.video[static_cast<std::size_t>(packet->view)].Push(packet);
+  });
 }
 
 void StreamHub::OnStatistics(const EngineStatistics& statistics) {
-  {
-    const std::lock_guard lock(mutex_);
-    statistics_ = statistics;
-  }
-  runner_.Post(statistics).IgnoreError();
+  Leave([&](Pending& pending) { statistics_ = *(pending.statistics = statistics); });
 }
 
 void StreamHub::OnGaze(const std::shared_ptr<const GazeSnapshot>& state) {
-  runner_.Post(state).IgnoreError();
+  Leave([&](Pending& pending) { pending.gaze = state; });
 }
 
 void StreamHub::OnEndOfSource(std::uint64_t frames) {
-  {
-    const std::lock_guard lock(mutex_);
-    end_frames_ = frames;
-  }
-  runner_.Post(EndOfSource{frames}).IgnoreError();
+  Leave([&](Pending& pending) { end_frames_ = pending.end_frames = frames; });
 }
 
 void StreamHub::AbandonTheSilent(Timestamp now_ns) {
@@ -62,6 +65,7 @@ void StreamHub::AbandonTheSilent(Timestamp now_ns) {
       const std::optional<Timestamp> since_ns = stream->unacknowledged_since();
       if (!since_ns || now_ns - *since_ns < silence_ns_) return false;
       silent.push_back(stream);
+      by_session_.erase(stream->session().id);
       return true;
     });
   }
@@ -72,32 +76,66 @@ void StreamHub::AbandonTheSilent(Timestamp now_ns) {
   }
 }
 
-void StreamHub::Distribute(const Message& message) {
-  // Statistics come once a second.
-  if (std::holds_alternative<EngineStatistics>(message)) AbandonTheSilent(MonotonicNow());
+struct StreamHub::Round {
   std::optional<NumberedState> state;
-  if (const auto* tracked = std::get_if<TrackedEvent>(&message)) {
-    state = log_.Next(*tracked, MonotonicNow());
-    const std::lock_guard lock(mutex_);
-    numbered_ = state;
+  std::uint64_t frames_passed_over = 0;
+  std::vector<PacketBacklog::Entry> video;  // of both views
+  std::optional<EngineStatistics> statistics;
+  std::shared_ptr<const GazeSnapshot> gaze;
+  std::optional<std::uint64_t> end_frames;
+  std::shared_ptr<const v1::PresenceEvent> presence;
+
+  void OfferTo(Subscription& subscription) const {
+    if (state) subscription.Offer(*state, frames_passed_over);
+    for (const PacketBacklog::Entry& entry : video) {
+      entry.shed ? subscription.Skip(*entry.packet) : subscription.Offer(entry.packet);
+    }
+    if (statistics) subscription.Offer(*statistics);
+    if (gaze) subscription.OfferGaze(gaze);
+    if (end_frames) subscription.OfferEnd(*end_frames);
+    if (presence) subscription.OfferPresence(presence);
   }
-  const std::shared_ptr<const v1::PresenceEvent> present = presence();
-  for (const std::shared_ptr<Subscriber>& stream : Streams()) {
-    stream->Update([&](Subscription& subscription) {
-      if (state) {
-        subscription.Offer(*state);
-      } else if (const auto* packet = std::get_if<std::shared_ptr<const VideoPacket>>(&message)) {
-        subscription.Offer(*packet);
-      } else if (const auto* statistics = std::get_if<EngineStatistics>(&message)) {
-        subscription.Offer(*statistics);
-      } else if (const auto* gaze = std::get_if<std::shared_ptr<const GazeSnapshot>>(&message)) {
-        subscription.OfferGaze(*gaze);
-      } else if (const auto* end = std::get_if<EndOfSource>(&message)) {
-        subscription.OfferEnd(end->frames);
-      } else {
-        subscription.OfferPresence(present);
-      }
-    });
+};
+
+StreamHub::Round StreamHub::Prepare() {
+  Round round;
+  std::optional<TrackedEvent> tracked;
+  const Timestamp now_ns = MonotonicNow();
+  {
+    const std::lock_guard lock(mutex_);
+    Pending pending = std::exchange(pending_, Pending());
+    tracked = std::move(pending.tracked);
+    round.frames_passed_over = pending.frames_passed_over;
+    for (PacketBacklog& view : pending.video) {
+      for (PacketBacklog::Entry& entry : view.TakeAll()) round.video.push_back(std::move(entry));
+    }
+    round.statistics = pending.statistics;
+    round.gaze = std::move(pending.gaze);
+    round.end_frames = pending.end_frames;
+    if (presence_changed_ && now_ns - presence_ns_ >= kPresenceInterval) {
+      presence_changed_ = false;
+      presence_ns_ = now_ns;
+      round.presence = presence_;
+    }
+  }
+  if (tracked) {
+    round.state = log_.Next(*tracked, now_ns);
+    const std::lock_guard lock(mutex_);
+    numbered_ = round.state;
+  }
+  return round;
+}
+
+void StreamHub::GoRound() {
+  const Round round = Prepare();
+  if (round.statistics) AbandonTheSilent(MonotonicNow());  // once a second
+  const std::vector<std::shared_ptr<Subscriber>> streams = Streams();
+  if (streams.empty()) return;
+  // Not the same one first each time: who comes late in a round that is too long waits longest.
+  first_ = (first_ + streams.size() / 3 + 1) % streams.size();
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    streams[(first_ + i) % streams.size()]->Update(
+        [&round](Subscription& subscription) { round.OfferTo(subscription); });
   }
 }
 
@@ -131,13 +169,9 @@ bool StreamHub::Insert(const std::shared_ptr<Subscriber>& subscriber,
                        std::shared_ptr<Subscriber>& replaced) {
   const std::lock_guard lock(mutex_);
   if (closed_) return false;
-  const auto same = std::find_if(streams_.begin(), streams_.end(), [&](const auto& other) {
-    return other->session().id == subscriber->session().id;
-  });
-  if (same != streams_.end()) {
-    replaced = *same;
-    streams_.erase(same);
-  }
+  std::shared_ptr<Subscriber>& held = by_session_[subscriber->session().id];
+  replaced = std::exchange(held, subscriber);
+  if (replaced != nullptr) std::erase(streams_, replaced);
   streams_.push_back(subscriber);
   return true;
 }
@@ -145,10 +179,9 @@ bool StreamHub::Insert(const std::shared_ptr<Subscriber>& subscriber,
 void StreamHub::Remove(const Subscriber* subscriber) {
   {
     const std::lock_guard lock(mutex_);
-    if (std::erase_if(streams_,
-                      [subscriber](const auto& one) { return one.get() == subscriber; }) == 0) {
-      return;
-    }
+    const auto same = [subscriber](const auto& one) { return one.get() == subscriber; };
+    if (std::erase_if(streams_, same) == 0) return;
+    by_session_.erase(subscriber->session().id);
   }
   StreamsChanged();
 }
@@ -175,20 +208,25 @@ void StreamHub::StreamsChanged() {
                                wanted[static_cast<std::size_t>(view)]);
     }
   }
-  runner_.Post(PresenceChanged{}).IgnoreError();
+  Leave([this](Pending&) { presence_changed_ = true; });
 }
 
 absl::Status StreamHub::Acknowledge(const std::string& session_id, std::uint64_t sequence,
                                     bool request_key_frame) {
-  for (const std::shared_ptr<Subscriber>& stream : Streams()) {
-    if (stream->session().id != session_id) continue;
-    absl::Status result;
-    stream->Update([&](Subscription& subscription) {
-      result = subscription.Acknowledge(sequence, request_key_frame);
-    });
-    return result;
+  std::shared_ptr<Subscriber> stream;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = by_session_.find(session_id);
+    if (found != by_session_.end()) stream = found->second;
   }
-  return absl::NotFoundError("session_id: this session has no stream: call Subscribe");
+  if (stream == nullptr) {
+    return absl::NotFoundError("session_id: this session has no stream: call Subscribe");
+  }
+  absl::Status result;
+  stream->Update([&](Subscription& subscription) {
+    result = subscription.Acknowledge(sequence, request_key_frame);
+  });
+  return result;
 }
 
 void StreamHub::CloseAll(const absl::Status& status) {
@@ -197,6 +235,7 @@ void StreamHub::CloseAll(const absl::Status& status) {
     const std::lock_guard lock(mutex_);
     closed_ = true;
     streams.swap(streams_);
+    by_session_.clear();
   }
   for (const auto& stream : streams) stream->Close(status);
 }

@@ -1,17 +1,21 @@
 #pragma once
 
+#include <absl/container/flat_hash_map.h>
 #include <absl/status/status.h>
 
+#include <array>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <variant>
+#include <utility>
 #include <vector>
 
 #include "server/pipeline/events.hpp"
 #include "server/pipeline/runner.hpp"
 #include "server/rpc/backend.hpp"
+#include "server/rpc/event_bytes.hpp"
+#include "server/rpc/packet_backlog.hpp"
 #include "server/rpc/session_table.hpp"
 #include "server/rpc/subscription.hpp"
 
@@ -20,8 +24,9 @@ namespace saccade {
 /// One open stream: a Subscription, its lock, and something that writes.
 class Subscriber {
  public:
-  Subscriber(Session session, const SubscriptionOptions& options)
-      : session_(std::move(session)), subscription_(options) {}
+  /// `bytes`: of the hub.
+  Subscriber(Session session, const SubscriptionOptions& options, std::shared_ptr<EventBytes> bytes)
+      : session_(std::move(session)), subscription_(options, std::move(bytes)) {}
   virtual ~Subscriber() = default;
 
   const Session& session() const { return session_; }
@@ -59,8 +64,12 @@ class Subscriber {
   Subscription subscription_;
 };
 
-/// Hands what the engine publishes to every open stream. Publishing only queues: one thread of the
-/// hub's own offers to the streams, so neither tracker nor encoder ever waits for a client.
+/// Hands what the engine publishes to every open stream. Publishing only leaves it here: one thread
+/// of the hub's own offers to the streams, so neither tracker nor encoder ever waits for a client.
+///
+/// It goes round: each time it takes all that has been left since, the newest of everything and the
+/// pictures, and offers it to every stream at once. So when there are more streams than the machine
+/// can serve the rounds take longer, and all get fewer poses and pictures alike, not older ones.
 class StreamHub : public EventSink {
  public:
   /// A stream whose events nobody acknowledges for `silence_ns` ends (DeadlineExceeded): who stands
@@ -71,6 +80,8 @@ class StreamHub : public EventSink {
   /// Where key frames are asked for. Before the first Add; `backend` outlives the hub's streams.
   void Connect(Backend* backend) { backend_ = backend; }
   Backend* backend() const { return backend_; }
+  /// What the streams share of their events.
+  const std::shared_ptr<EventBytes>& bytes() const { return bytes_; }
 
   void OnTracked(const TrackedEvent& event) override;
   void OnVideo(const std::shared_ptr<const VideoPacket>& packet) override;
@@ -94,14 +105,24 @@ class StreamHub : public EventSink {
   std::optional<std::uint64_t> end_of_source() const;
 
  private:
-  struct PresenceChanged {};
-  struct EndOfSource {
-    std::uint64_t frames;
+  /// What was left since the last round.
+  struct Pending {
+    std::optional<TrackedEvent> tracked;
+    std::uint64_t frames_passed_over = 0;  // tracked, and replaced by `tracked`
+    std::array<PacketBacklog, kVideoViews> video;
+    std::optional<EngineStatistics> statistics;
+    std::shared_ptr<const GazeSnapshot> gaze;
+    std::optional<std::uint64_t> end_frames;
   };
-  using Message = std::variant<TrackedEvent, std::shared_ptr<const VideoPacket>, EngineStatistics,
-                               std::shared_ptr<const GazeSnapshot>, EndOfSource, PresenceChanged>;
+  struct Wake {};
+  /// The same, worked out and ready to be offered.
+  struct Round;
 
-  void Distribute(const Message& message);
+  /// Changes what is pending under its lock, and wakes the hub's thread.
+  template <typename Change>
+  void Leave(Change change);
+  void GoRound();
+  Round Prepare();
   void AbandonTheSilent(Timestamp now_ns);
   /// False: closed. `replaced` is the stream that the same session had.
   bool Insert(const std::shared_ptr<Subscriber>& subscriber, std::shared_ptr<Subscriber>& replaced);
@@ -113,14 +134,21 @@ class StreamHub : public EventSink {
   Backend* backend_ = nullptr;
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Subscriber>> streams_;
+  absl::flat_hash_map<std::string, std::shared_ptr<Subscriber>> by_session_;  // the same
   bool closed_ = false;
   std::optional<TrackedEvent> newest_;
   std::optional<NumberedState> numbered_;  // the newest that the hub's thread has worked out
   EngineStatistics statistics_;
   std::shared_ptr<const v1::PresenceEvent> presence_;
   std::optional<std::uint64_t> end_frames_;
-  ChangeLog log_;           // the hub's thread
-  Runner<Message> runner_;  // last: its thread uses everything above
+  Pending pending_;
+  bool presence_changed_ = false;
+  const std::shared_ptr<EventBytes> bytes_ = std::make_shared<EventBytes>();
+  // The hub's thread.
+  ChangeLog log_;
+  Timestamp presence_ns_ = 0;  // when it was last told
+  std::size_t first_ = 0;      // which stream is next to be first
+  Runner<Wake> runner_;        // last: its thread uses everything above
 };
 
 }  // namespace saccade

@@ -1,8 +1,28 @@
 #include "server/rpc/stream_writer.hpp"
 
+#include <array>
+
 #include "server/rpc/status.hpp"
 
 namespace saccade {
+namespace {
+
+// A slice that holds the bytes as long as gRPC needs them.
+grpc::Slice Shared(const Bytes& bytes) {
+  return {const_cast<char*>(bytes->data()), bytes->size(),
+          [](void* held) { delete static_cast<Bytes*>(held); }, new Bytes(bytes)};
+}
+
+grpc::ByteBuffer ToBuffer(const EncodedEvent& event) {
+  std::array<grpc::Slice, 3> slices;
+  std::size_t count = 0;
+  slices[count++] = grpc::Slice(event.head);
+  if (event.shared && !event.shared->empty()) slices[count++] = Shared(event.shared);
+  if (!event.tail.empty()) slices[count++] = grpc::Slice(event.tail);
+  return {slices.data(), count};
+}
+
+}  // namespace
 
 StreamWriter* StreamWriter::Open(StreamHub& hub, Session session,
                                  const SubscriptionOptions& options,
@@ -20,7 +40,9 @@ void StreamWriter::Pump() {
     const std::lock_guard lock(mutex_);
     if (writing_ || finished_ || closing_) return;
     const Timestamp now_ns = MonotonicNow();
-    write = writing_ = subscription_.Next(now_ns, event_);
+    EncodedEvent event;
+    write = writing_ = subscription_.Next(now_ns, event);
+    if (write) event_ = ToBuffer(event);
     ask = subscription_.WantsKeyFrame(now_ns);
   }
   // Outside the lock: gRPC may run OnWriteDone before StartWrite returns. Nothing else touches

@@ -5,14 +5,14 @@
 #include <memory>
 #include <mutex>
 
-#include "saccade/v1/session.pb.h"
 #include "server/rpc/stream_hub.hpp"
 
 namespace saccade {
 
 /// The gRPC end of one stream: at most one write under way, the next event made when it is done.
+/// What it writes is encoded already, for the most part once for all streams, and is not copied.
 /// Owns itself from Open until gRPC reports OnDone.
-class StreamWriter : public grpc::ServerWriteReactor<v1::Event>, public Subscriber {
+class StreamWriter : public grpc::ServerWriteReactor<grpc::ByteBuffer>, public Subscriber {
  public:
   /// `context` belongs to the call; `hold` keeps the session while the stream is open.
   static StreamWriter* Open(StreamHub& hub, Session session, const SubscriptionOptions& options,
@@ -25,7 +25,7 @@ class StreamWriter : public grpc::ServerWriteReactor<v1::Event>, public Subscrib
  private:
   StreamWriter(StreamHub& hub, Session session, const SubscriptionOptions& options,
                grpc::CallbackServerContext& context, std::shared_ptr<void> hold)
-      : Subscriber(std::move(session), options),
+      : Subscriber(std::move(session), options, hub.bytes()),
         hub_(hub),
         context_(context),
         hold_(std::move(hold)) {}
@@ -40,7 +40,7 @@ class StreamWriter : public grpc::ServerWriteReactor<v1::Event>, public Subscrib
   bool done_ = false;
   const std::shared_ptr<void> hold_;
   std::shared_ptr<StreamWriter> self_;
-  v1::Event event_;  // being written while writing_
+  grpc::ByteBuffer event_;  // an encoded v1::Event, being written while writing_
   bool writing_ = false;
   bool finished_ = false;                // Finish was called
   std::optional<absl::Status> closing_;  // Finish with this as soon as no write is under way

@@ -2,36 +2,21 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "shared/wire/gaze.hpp"
-#include "shared/wire/to_proto.hpp"
-
 namespace saccade {
 namespace {
 
 constexpr std::uint32_t kDefaultWindow = 32;
 constexpr std::uint32_t kMaxWindow = 256;
 
-v1::AccessUnit AccessUnitToProto(const VideoPacket& packet, Timestamp now_ns) {
+// What only this subscriber's stream knows of a picture; merges with its other stages.
+std::string QueuedStage(Timestamp now_ns) {
   v1::AccessUnit unit;
-  const TrackedEvent& tracked = packet.tracked;
-  unit.set_frame_id(tracked.snapshot->frame_id);
-  unit.set_view(packet.view == VideoView::kRaw ? v1::VIDEO_VIEW_RAW : v1::VIDEO_VIEW_AUGMENTED);
-  unit.set_codec(v1::VIDEO_CODEC_H264);
-  unit.set_key_frame(packet.key_frame);
-  unit.set_temporal_layer(static_cast<std::uint32_t>(packet.temporal_layer));
-  unit.set_data(*packet.data);
-  CameraIntrinsics coded = tracked.camera->intrinsics();
-  coded.width = packet.width;
-  coded.height = packet.height;
-  *unit.mutable_intrinsics() = wire::ToProto(coded);
-  *unit.mutable_pose() = wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns);
-  v1::StageTimestamps& stages = *unit.mutable_stages();
-  stages.set_captured_ns(tracked.stages.captured_ns);
-  stages.set_received_ns(tracked.stages.received_ns);
-  stages.set_tracked_ns(tracked.stages.tracked_ns);
-  stages.set_encoded_ns(tracked.stages.encoded_ns);
-  stages.set_queued_ns(now_ns);
-  return unit;
+  unit.mutable_stages()->set_queued_ns(now_ns);
+  return unit.SerializeAsString();
+}
+
+Bytes Serialized(const google::protobuf::Message& message) {
+  return std::make_shared<const std::string>(message.SerializeAsString());
 }
 
 }  // namespace
@@ -60,18 +45,22 @@ absl::StatusOr<SubscriptionOptions> SubscriptionOptions::FromProto(
   return options;
 }
 
-void Subscription::Offer(const NumberedState& state) {
+void Subscription::Offer(const NumberedState& state, std::uint64_t frames_passed_over) {
   // Between frames the annotations alone change: the pose is known already.
   const bool same_frame = state_ && state_->tracked.snapshot == state.tracked.snapshot;
   state_ = state;
   annotations_due_ = true;
   if (same_frame) return;
-  if (pose_due_ && Has(v1::TOPIC_POSE)) ++poses_skipped_;
+  if (Has(v1::TOPIC_POSE)) poses_skipped_ += frames_passed_over + (pose_due_ ? 1 : 0);
   pose_due_ = map_due_ = true;
 }
 
 void Subscription::Offer(const std::shared_ptr<const VideoPacket>& packet) {
   if (Has(v1::TOPIC_VIDEO) && packet->view == options_.view) video_.Push(packet);
+}
+
+void Subscription::Skip(const VideoPacket& packet) {
+  if (Has(v1::TOPIC_VIDEO) && packet.view == options_.view) video_.Skip(packet);
 }
 
 void Subscription::Offer(const EngineStatistics& statistics) { statistics_ = statistics; }
@@ -107,13 +96,14 @@ bool Subscription::WantsKeyFrame(Timestamp now_ns) {
   return Has(v1::TOPIC_VIDEO) && WindowOpen() && video_.WantsKeyFrame(now_ns);
 }
 
-bool Subscription::Next(Timestamp now_ns, v1::Event& event) {
+bool Subscription::Next(Timestamp now_ns, EncodedEvent& event) {
   if (!WindowOpen()) return false;
   for (int turn = 1; turn <= kKinds; ++turn) {
     const int kind = (last_kind_ + turn) % kKinds;
-    event.Clear();
-    if (!Fill(static_cast<Kind>(kind), now_ns, event)) continue;
-    event.set_sequence(++sequence_);
+    std::optional<Payload> payload = Fill(static_cast<Kind>(kind), now_ns);
+    if (!payload) continue;
+    event = EncodedEvent::Of(++sequence_, payload->field, std::move(payload->bytes),
+                             std::move(payload->tail));
     if (!unacknowledged_since_) unacknowledged_since_ = now_ns;
     last_kind_ = kind;
     return true;
@@ -121,75 +111,65 @@ bool Subscription::Next(Timestamp now_ns, v1::Event& event) {
   return false;
 }
 
-bool Subscription::Fill(Kind kind, Timestamp now_ns, v1::Event& event) {
+std::optional<Subscription::Payload> Subscription::Fill(Kind kind, Timestamp now_ns) {
   switch (kind) {
     case kAnnotations:
-      return Has(v1::TOPIC_ANNOTATION) && FillAnnotations(event);
+      return FillAnnotations();
     case kMap:
-      return Has(v1::TOPIC_MAP) && FillMap(event);
+      return FillMap();
     case kPresence:
-      if (!Has(v1::TOPIC_PRESENCE) || presence_ == nullptr) return false;
-      *event.mutable_presence() = *std::exchange(presence_, nullptr);
-      return true;
+      if (!Has(v1::TOPIC_PRESENCE) || presence_ == nullptr) return std::nullopt;
+      return Payload{v1::Event::kPresenceFieldNumber,
+                     bytes_->Presence(std::exchange(presence_, {}))};
     case kGaze:
-      if (!Has(v1::TOPIC_GAZE) || gaze_ == nullptr) return false;
-      *event.mutable_gaze() = wire::ToProto(*std::exchange(gaze_, nullptr));
-      return true;
+      if (!Has(v1::TOPIC_GAZE) || gaze_ == nullptr) return std::nullopt;
+      return Payload{v1::Event::kGazeFieldNumber, bytes_->Gaze(std::exchange(gaze_, {}))};
     case kPose:
-      return FillPose(event);
+      if (!Has(v1::TOPIC_POSE) || !std::exchange(pose_due_, false)) return std::nullopt;
+      return Payload{v1::Event::kPoseFieldNumber, bytes_->Pose(state_->tracked)};
     case kVideo:
-      return FillVideo(now_ns, event);
+      return FillVideo(now_ns);
     case kStatistics:
-      return FillStatistics(event);
-    case kEnd:
-      if (!end_frames_) return false;
-      event.mutable_end_of_source()->set_frames(*std::exchange(end_frames_, std::nullopt));
-      return true;
+      if (!Has(v1::TOPIC_STATISTICS) || !statistics_) return std::nullopt;
+      return Payload{v1::Event::kStatisticsFieldNumber,
+                     Serialized(StatisticsToProto(*std::exchange(statistics_, std::nullopt),
+                                                  video_.skipped() + poses_skipped_))};
+    case kEnd: {
+      if (!end_frames_) return std::nullopt;
+      v1::EndOfSource end;
+      end.set_frames(*std::exchange(end_frames_, std::nullopt));
+      return Payload{v1::Event::kEndOfSourceFieldNumber, Serialized(end)};
+    }
     case kKinds:
       break;
   }
-  return false;
+  return std::nullopt;
 }
 
-// The parts of a large state follow at once, in turn with the other kinds.
-bool Subscription::FillAnnotations(v1::Event& event) {
-  if (!annotations_due_) return false;
-  const bool filled = annotations_.Next(*state_, *event.mutable_annotation());
-  annotations_due_ = event.annotation().more();
-  return filled;
+// The parts of a large state follow at once, in turn with the other kinds. Who had the same state
+// before is sent the same.
+std::optional<Subscription::Payload> Subscription::FillAnnotations() {
+  if (!Has(v1::TOPIC_ANNOTATION) || !std::exchange(annotations_due_, false)) return std::nullopt;
+  const Bytes bytes = bytes_->Annotations(*state_, annotations_);
+  annotations_due_ = !annotations_.complete();
+  if (bytes == nullptr) return std::nullopt;
+  return Payload{v1::Event::kAnnotationFieldNumber, bytes};
 }
 
-bool Subscription::FillMap(v1::Event& event) {
-  if (!map_due_) return false;
-  const bool filled = map_.Next(*state_, *event.mutable_map());
-  map_due_ = event.map().more();
-  return filled;
+std::optional<Subscription::Payload> Subscription::FillMap() {
+  if (!Has(v1::TOPIC_MAP) || !std::exchange(map_due_, false)) return std::nullopt;
+  const Bytes bytes = bytes_->Map(*state_, map_);
+  map_due_ = !map_.complete();
+  if (bytes == nullptr) return std::nullopt;
+  return Payload{v1::Event::kMapFieldNumber, bytes};
 }
 
-bool Subscription::FillPose(v1::Event& event) {
-  if (!Has(v1::TOPIC_POSE) || !std::exchange(pose_due_, false)) return false;
-  const TrackedEvent& tracked = state_->tracked;
-  *event.mutable_pose() = wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns);
-  return true;
-}
-
-bool Subscription::FillVideo(Timestamp now_ns, v1::Event& event) {
-  if (!Has(v1::TOPIC_VIDEO)) return false;
+std::optional<Subscription::Payload> Subscription::FillVideo(Timestamp now_ns) {
+  if (!Has(v1::TOPIC_VIDEO)) return std::nullopt;
   const std::shared_ptr<const VideoPacket> packet = video_.Take(now_ns);
-  if (packet == nullptr) return false;
-  v1::AccessUnit& unit = *event.mutable_access_unit() = AccessUnitToProto(*packet, now_ns);
-  // Of the packet's own frame, not of the newest: a dot belongs to the picture it was measured in.
-  if (Has(v1::TOPIC_MAP)) {
-    *unit.mutable_features() = wire::ToProtoFeatures(*packet->tracked.snapshot);
-  }
-  return true;
-}
-
-bool Subscription::FillStatistics(v1::Event& event) {
-  if (!Has(v1::TOPIC_STATISTICS) || !statistics_) return false;
-  *event.mutable_statistics() = StatisticsToProto(*std::exchange(statistics_, std::nullopt),
-                                                  video_.skipped() + poses_skipped_);
-  return true;
+  if (packet == nullptr) return std::nullopt;
+  return Payload{v1::Event::kAccessUnitFieldNumber, bytes_->AccessUnit(packet, Has(v1::TOPIC_MAP)),
+                 QueuedStage(now_ns)};
 }
 
 v1::StatisticsEvent StatisticsToProto(const EngineStatistics& statistics,

@@ -7,12 +7,14 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "saccade/v1/session.pb.h"
 #include "server/pipeline/events.hpp"
 #include "server/rpc/deltas.hpp"
+#include "server/rpc/event_bytes.hpp"
 #include "server/rpc/video_queue.hpp"
 
 namespace saccade {
@@ -34,10 +36,16 @@ struct SubscriptionOptions {
 /// thread safe.
 class Subscription {
  public:
-  explicit Subscription(const SubscriptionOptions& options) : options_(options) {}
+  /// `bytes`: shared by the subscriptions of one hub; null: of its own.
+  explicit Subscription(const SubscriptionOptions& options,
+                        std::shared_ptr<EventBytes> bytes = nullptr)
+      : options_(options), bytes_(bytes ? std::move(bytes) : std::make_shared<EventBytes>()) {}
 
-  void Offer(const NumberedState& state);
+  /// `frames_passed_over`: newer than the last one offered, and replaced by this one.
+  void Offer(const NumberedState& state, std::uint64_t frames_passed_over = 0);
   void Offer(const std::shared_ptr<const VideoPacket>& packet);
+  /// In place of a packet that nobody is sent.
+  void Skip(const VideoPacket& packet);
   void Offer(const EngineStatistics& statistics);
   void OfferGaze(std::shared_ptr<const GazeSnapshot> state);
   void OfferPresence(std::shared_ptr<const v1::PresenceEvent> presence);
@@ -51,7 +59,7 @@ class Subscription {
 
   /// Fills the next event, if there is one and the window allows it. Kinds take turns, so that
   /// video cannot starve the map; a new subscriber has annotations and map before any picture.
-  bool Next(Timestamp now_ns, v1::Event& event);
+  bool Next(Timestamp now_ns, EncodedEvent& event);
 
   /// True if the encoder should be asked for a key frame now (only while events may be sent).
   bool WantsKeyFrame(Timestamp now_ns);
@@ -66,14 +74,19 @@ class Subscription {
 
   bool Has(v1::Topic topic) const { return options_.topics.test(static_cast<std::size_t>(topic)); }
   bool WindowOpen() const { return sequence_ - acknowledged_ < options_.window; }
-  bool Fill(Kind kind, Timestamp now_ns, v1::Event& event);
-  bool FillVideo(Timestamp now_ns, v1::Event& event);
-  bool FillAnnotations(v1::Event& event);
-  bool FillMap(v1::Event& event);
-  bool FillPose(v1::Event& event);
-  bool FillStatistics(v1::Event& event);
+  /// A field of an Event.
+  struct Payload {
+    int field;
+    Bytes bytes;
+    std::string tail = {};
+  };
+  std::optional<Payload> Fill(Kind kind, Timestamp now_ns);
+  std::optional<Payload> FillAnnotations();
+  std::optional<Payload> FillMap();
+  std::optional<Payload> FillVideo(Timestamp now_ns);
 
   const SubscriptionOptions options_;
+  const std::shared_ptr<EventBytes> bytes_;
   std::uint64_t sequence_ = 0;
   std::uint64_t acknowledged_ = 0;
   std::optional<Timestamp> unacknowledged_since_;

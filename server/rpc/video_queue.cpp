@@ -5,10 +5,24 @@
 
 namespace saccade {
 
+void VideoQueue::NoteSequence(const VideoPacket& packet) {
+  const bool gap = packet.sequence != last_sequence_ + 1;
+  last_sequence_ = packet.sequence;
+  if (gap && !packet.key_frame) LoseReference();
+}
+
+void VideoQueue::Skip(const VideoPacket& packet) {
+  NoteSequence(packet);
+  if (started_) ++skipped_;
+  if (packet.temporal_layer == 0) {
+    LoseReference();
+  } else if (packet.temporal_layer == 1) {
+    reference_kept_ = false;
+  }
+}
+
 void VideoQueue::Push(std::shared_ptr<const VideoPacket> packet) {
-  const bool gap = packet->sequence != last_sequence_ + 1;
-  last_sequence_ = packet->sequence;
-  if (gap && !packet->key_frame) RequireKeyFrame();
+  NoteSequence(*packet);
   if (!Fits(*packet)) {
     if (started_) ++skipped_;
     return;
@@ -76,6 +90,11 @@ std::shared_ptr<const VideoPacket> VideoQueue::Take(Timestamp now_ns) {
   waiting_.pop_front();
   started_ = true;
   return packet;
+}
+
+// Once a key frame is wanted, further losses are no reason to ask again sooner.
+void VideoQueue::LoseReference() {
+  if (!needs_key_frame_) RequireKeyFrame();
 }
 
 void VideoQueue::RequireKeyFrame() {

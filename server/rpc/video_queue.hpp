@@ -26,6 +26,8 @@ class VideoQueue {
   explicit VideoQueue(const Limits& limits) : limits_(limits) {}
 
   void Push(std::shared_ptr<const VideoPacket> packet);
+  /// In its place: a packet that nobody is sent, because the server is behind as a whole.
+  void Skip(const VideoPacket& packet);
 
   /// The next packet to send, or null. Call only when it can be sent at once.
   std::shared_ptr<const VideoPacket> Take(Timestamp now_ns);
@@ -40,10 +42,12 @@ class VideoQueue {
   std::uint64_t skipped() const { return skipped_; }
 
  private:
+  void NoteSequence(const VideoPacket& packet);
   bool Fits(const VideoPacket& packet);
   void Shed();
   void RemoveLayer(int temporal_layer);
   void DropAll();
+  void LoseReference();
 
   Limits limits_;
   std::deque<std::shared_ptr<const VideoPacket>> waiting_;

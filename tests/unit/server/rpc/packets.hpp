@@ -40,9 +40,15 @@ inline std::shared_ptr<const VideoPacket> MakePacket(std::uint64_t index, bool k
 /// A subscription that is fed as by the hub: what is tracked is numbered first.
 class FedSubscription : public Subscription {
  public:
+  using Subscription::Next;
   using Subscription::Offer;
   using Subscription::Subscription;
   void Offer(const TrackedEvent& event, Timestamp now_ns = 0) { Offer(log_.Next(event, now_ns)); }
+  /// The next event as a client reads it.
+  bool Next(Timestamp now_ns, v1::Event& event) {
+    EncodedEvent encoded;
+    return Next(now_ns, encoded) && event.ParseFromString(encoded.Joined());
+  }
 
  private:
   ChangeLog log_;
