@@ -5,8 +5,10 @@
 #include <absl/strings/str_format.h>
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <iterator>
 #include <random>
+#include <thread>
 #include <utility>
 
 #include "client/net/convert.hpp"
@@ -25,6 +27,7 @@ constexpr int kMaxAnswerBytes = 64 << 20;  // a lossless picture of a large came
 constexpr std::uint32_t kWindow = 32;      // events in flight unacknowledged
 constexpr std::uint64_t kAcknowledgeEvery = 8;
 constexpr int kMaxPages = 10000;  // of a list
+constexpr std::chrono::milliseconds kTryAgain(250);
 
 grpc::ChannelArguments ChannelArguments() {
   grpc::ChannelArguments arguments;
@@ -77,12 +80,24 @@ class Connection::Impl {
                                 grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
                                                              Response*),
                                 const Request& request) {
-    grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + options_.deadline);
-    Response response;
-    const grpc::Status status = (stub.*method)(&context, request, &response);
-    if (!status.ok()) return Explain(status);
-    return response;
+    const auto give_up = std::chrono::system_clock::now() + options_.deadline;
+    for (;;) {
+      grpc::ClientContext context;
+      context.set_deadline(give_up);
+      Response response;
+      const grpc::Status status = (stub.*method)(&context, request, &response);
+      if (status.ok()) return response;
+      if (!IsTooOften(status) || std::chrono::system_clock::now() + kTryAgain > give_up) {
+        return Explain(status);
+      }
+      std::this_thread::sleep_for(kTryAgain);  // what was refused did nothing
+    }
+  }
+
+  // Somebody at our address floods the server, perhaps we: it passes.
+  static bool IsTooOften(const grpc::Status& status) {
+    return status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED &&
+           status.error_details().find("google.rpc.RetryInfo") != std::string::npos;
   }
 
   // A call that names the session. If the server has forgotten it (it restarted), joins anew, once.

@@ -1,6 +1,7 @@
 #include "server/app/engine.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <malloc.h>
 #include <absl/strings/str_format.h>
 
 #include <condition_variable>
@@ -21,6 +22,15 @@ constexpr Timestamp kSourceQuiet = 500'000'000;
 
 const cv::Mat& PictureOf(const Frame& frame) {
   return frame.color.empty() ? frame.grey : frame.color;
+}
+
+// The allocator keeps what a flood needed for a moment. Asked rarely, and only for a lot: giving it
+// back holds each arena for some milliseconds.
+constexpr int kTrimEveryS = 10;
+constexpr std::size_t kFreedBytes = std::size_t{64} << 20;
+
+void GiveBackFreedMemory() {
+  if (::mallinfo2().fordblks > kFreedBytes) ::malloc_trim(0);
 }
 
 }  // namespace
@@ -251,10 +261,12 @@ void Engine::RunClock(std::stop_token stop) {
   std::mutex mutex;
   std::condition_variable_any never;
   std::unique_lock lock(mutex);
+  int seconds = 0;
   while (!never.wait_for(lock, stop, std::chrono::seconds(1), [] { return false; })) {
     if (stop.stop_requested()) return;
     sink_.OnStatistics(Statistics());
     for (const auto& view : views_) view->Tick();
+    if (++seconds % kTrimEveryS == 0) GiveBackFreedMemory();
     if (MonotonicNow() - tracked_ns_ > kSourceQuiet) inbox_.PutNewestIfEmpty({});
   }
 }

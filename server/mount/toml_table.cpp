@@ -34,7 +34,7 @@ struct TomlTable::State {
   }
   void Read(const toml::value& value, const std::string& key, double scale, double& out) {
     if (value.is_floating() && !std::isfinite(value.as_floating())) {
-      Say(key, "is not a finite number; give one");
+      Say(key, "is not a finite number; give a number");
     } else if (value.is_floating()) {
       out = scale * value.as_floating();
     } else if (value.is_integer()) {

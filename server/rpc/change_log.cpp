@@ -12,6 +12,7 @@ constexpr double kMovedSigmas = 0.1;
 constexpr double kChangedShare = 0.1;
 constexpr double kMovedPx = 0.25;
 constexpr Timestamp kRefreshNs = 200'000'000;
+constexpr Timestamp kWordsRefreshNs = 1'000'000'000;
 
 bool ChangedByShare(double now, double before) {
   return std::abs(now - before) > kChangedShare * std::max(now, before);
@@ -38,6 +39,8 @@ bool EstimateChanged(const Annotation& now, const Annotation& sent, Timestamp ag
     return true;
   }
   if (ShiftPx(sent.anchor.point_in_world, anchor.point_in_world, event) > kMovedPx) return true;
+  // Words hold figures that change all the time.
+  if (age_ns >= kWordsRefreshNs && anchor.reason != sent.anchor.reason) return true;
   return age_ns >= kRefreshNs && (anchor.error_px.has_value() != sent.anchor.error_px.has_value() ||
                                   ChangedByShare(anchor.error_m, sent.anchor.error_m));
 }

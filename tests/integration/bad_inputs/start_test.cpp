@@ -1,45 +1,23 @@
 // What the server refuses to start on, and what it goes on without.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <nlohmann/json.hpp>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
+#include "tests/integration/bad_inputs/bad_data_set.hpp"
 #include "tests/integration/bad_inputs/table.hpp"
-#include "tests/integration/support/small_dataset.hpp"
 
 namespace saccade::testing {
 namespace {
 
 namespace fs = std::filesystem;
 
-void Write(const fs::path& path, const std::string& text) {
-  std::ofstream(path, std::ios::binary) << text;
-}
-
 std::string Camera(const std::string& model, const std::string& rest = "") {
   return "model: " + model +
          "\nwidth: 320\nheight: 240\nfx: 288\nfy: 288\ncx: 159.5\ncy: 119.5\nfps: 30\n" + rest;
 }
-
-class BadDataSet : public ::testing::Test {
- protected:
-  // A good data set of a few frames that `spoil` breaks, as arguments.
-  std::vector<std::string> Spoiled(const std::function<void(const fs::path&)>& spoil) {
-    const fs::path set = folder_.path() + "/set";
-    fs::remove_all(set);
-    WriteSmallDataset(set, {.frames = 5});
-    spoil(set);
-    return {"--source", "dataset:" + set.string(), "--data-dir", folder_ / "data"};
-  }
-  TemporaryFolder folder_;
-};
 
 TEST_F(BadDataSet, ListIsRefusedWithFileLineAndRemedy) {
   const auto refuse = [&](const std::string& input, const std::string& part,
@@ -48,18 +26,18 @@ TEST_F(BadDataSet, ListIsRefusedWithFileLineAndRemedy) {
   };
   refuse("data set: folder does not exist", "set", [](const fs::path& p) { fs::remove_all(p); });
   refuse("data set: no rgb.txt", "rgb.txt", [](const fs::path& p) { fs::remove(p / "rgb.txt"); });
-  refuse("rgb.txt: empty", "rgb.txt", [](const fs::path& p) { Write(p / "rgb.txt", ""); });
+  refuse("rgb.txt: empty", "rgb.txt", [](const fs::path& p) { WriteText(p / "rgb.txt", ""); });
   refuse("rgb.txt: time is a word", "rgb.txt:1",
-         [](const fs::path& p) { Write(p / "rgb.txt", "soon rgb/0.000000.png\n"); });
+         [](const fs::path& p) { WriteText(p / "rgb.txt", "soon rgb/0.000000.png\n"); });
   refuse("rgb.txt: time is NaN", "rgb.txt:1",
-         [](const fs::path& p) { Write(p / "rgb.txt", "nan rgb/0.000000.png\n"); });
+         [](const fs::path& p) { WriteText(p / "rgb.txt", "nan rgb/0.000000.png\n"); });
   refuse("rgb.txt: times fall", "rgb.txt:2", [](const fs::path& p) {
-    Write(p / "rgb.txt", "1.0 rgb/0.000000.png\n0.5 rgb/0.033333.png\n");
+    WriteText(p / "rgb.txt", "1.0 rgb/0.000000.png\n0.5 rgb/0.033333.png\n");
   });
   refuse("rgb.txt: line without a file", "rgb.txt:1",
-         [](const fs::path& p) { Write(p / "rgb.txt", "1.0\n"); });
+         [](const fs::path& p) { WriteText(p / "rgb.txt", "1.0\n"); });
   refuse("rgb.txt: 4 KiB of zeros", "rgb.txt",
-         [](const fs::path& p) { Write(p / "rgb.txt", std::string(4096, '\0')); });
+         [](const fs::path& p) { WriteText(p / "rgb.txt", std::string(4096, '\0')); });
   for (const char* name : {"rgb.txt", "camera.yaml", "target.yaml", "start.yaml"}) {
     const std::string what = name;
     refuse(what + ": a named pipe", what + ": is a named pipe", [&](const fs::path& p) {
@@ -71,7 +49,7 @@ TEST_F(BadDataSet, ListIsRefusedWithFileLineAndRemedy) {
       fs::create_symlink("/dev/zero", p / name);
     });
     refuse(what + ": 64 GiB of nothing", what, [&](const fs::path& p) {
-      Write(p / name, "");
+      WriteText(p / name, "");
       fs::resize_file(p / name, std::uintmax_t{1} << 36);
     });
   }
@@ -81,7 +59,7 @@ TEST_F(BadDataSet, CameraIsRefusedWithFieldAndRemedy) {
   const auto refuse = [&](const std::string& input, const std::string& part,
                           const std::string& text) {
     ExpectRefusedStart("camera.yaml: " + input,
-                       Spoiled([&](const fs::path& p) { Write(p / "camera.yaml", text); }), 1,
+                       Spoiled([&](const fs::path& p) { WriteText(p / "camera.yaml", text); }), 1,
                        part);
   };
   ExpectRefusedStart("camera.yaml: missing",
@@ -108,94 +86,12 @@ TEST_F(BadDataSet, CameraIsRefusedWithFieldAndRemedy) {
 
 TEST_F(BadDataSet, TargetIsRefused) {
   ExpectRefusedStart("target.yaml: not YAML",
-                     Spoiled([](const fs::path& p) { Write(p / "target.yaml", "}{"); }), 1,
+                     Spoiled([](const fs::path& p) { WriteText(p / "target.yaml", "}{"); }), 1,
                      "target.yaml");
-  ExpectRefusedStart("target.yaml: unknown type",
-                     Spoiled([](const fs::path& p) { Write(p / "target.yaml", "type: moon\n"); }),
+  ExpectRefusedStart("target.yaml: unknown type", Spoiled([](const fs::path& p) {
+                       WriteText(p / "target.yaml", "type: moon\n");
+                     }),
                      1, "target.yaml");
-}
-
-TEST_F(BadDataSet, BrokenPicturesAreSkippedCountedAndNamed) {
-  const std::vector<std::string> arguments = Spoiled([](const fs::path& p) {
-    fs::remove(p / "rgb" / "0.000000.png");
-    Write(p / "rgb" / "0.033333.png", "");
-    const auto third = p / "rgb" / "0.066667.png";
-    fs::resize_file(third, fs::file_size(third) / 2);
-    Write(p / "rgb" / "0.100000.png", std::string(5000, 'x'));
-  });
-  Server server(arguments);
-  std::string err;
-  for (int i = 0; i < 100 && err.find("0.100000") == std::string::npos; ++i) {
-    server.process().Wait(std::chrono::milliseconds(50));
-    err = server.process().err();
-  }
-  const RunResult status =
-      RunProgram({SACCADE_PROGRAM, "--server", server.grpc(), "status", "--json"});
-  const auto json = nlohmann::json::parse(status.out, nullptr, false);
-  const bool named = err.find("0.000000.png") != std::string::npos &&
-                     err.find("0.033333.png") != std::string::npos &&
-                     err.find("0.100000.png") != std::string::npos;
-  Row("start", "pictures: one missing, one of 0 bytes, one cut in half, one of rubbish",
-      "skipped and named on stderr; serves: " + std::string(IsWell(server) ? "yes" : "no"),
-      named && IsWell(server) && !json.is_discarded());
-}
-
-// Before, under this limit: terminate called after throwing an instance of 'cv::Exception'.
-TEST_F(BadDataSet, APictureBombUnderAMemoryLimitIsSkipped) {
-  std::vector<std::string> arguments = Spoiled([](const fs::path& p) {
-    std::ifstream whole(p / "rgb" / "0.033333.png", std::ios::binary);
-    std::string png(std::istreambuf_iterator<char>(whole), {});
-    for (const std::size_t at : {16, 20}) png.replace(at, 4, std::string("\x00\x00\x75\x30", 4));
-    Write(p / "rgb" / "0.033333.png", png);
-    const cv::Mat large(6000, 6000, CV_8UC3, cv::Scalar(1, 2, 3));  // honest: 108 MB, and 36 grey
-    cv::imwrite((p / "rgb" / "0.066667.png").string(), large);
-  });
-  Server server(arguments);
-  rlimit limit{};  // little more than it has
-  std::ifstream statm("/proc/" + std::to_string(server.process().pid()) + "/statm");
-  std::size_t pages = 0;
-  statm >> pages;
-  limit.rlim_cur = limit.rlim_max = (pages * 4096) + (std::size_t{64} << 20);
-  prlimit(server.process().pid(), RLIMIT_AS, &limit, nullptr);
-  std::string err;
-  for (int i = 0; i < 100 && err.find("0.066667") == std::string::npos; ++i) {
-    server.process().Wait(std::chrono::milliseconds(50));
-    err = server.process().err();
-  }
-  Row("start", "pictures: one claims 30000 x 30000, one is 6000 x 6000, memory is limited",
-      "skipped and named: " + std::string(err.find("0.033333") != std::string::npos ? "yes" : "no"),
-      err.find("0.033333") != std::string::npos && err.find("0.066667") != std::string::npos &&
-          IsWell(server));
-}
-
-TEST_F(BadDataSet, PicturesThatCannotBeVideoAreRefused) {
-  fs::create_directories(folder_ / "wide/rgb");
-  cv::imwrite(folder_ / "wide/rgb/0.png", cv::Mat(64, 4400, CV_8UC1, cv::Scalar(9)));
-  Write(folder_ / "wide/rgb.txt", "0 rgb/0.png\n");
-  Write(folder_ / "wide/camera.yaml",
-        "model: pinhole\nwidth: 4400\nheight: 64\nfx: 1000\nfy: 1000\ncx: 2200\ncy: 32\n");
-  ExpectRefusedStart("pictures wider than the video coder takes",
-                     {"--source", "dataset:" + (folder_ / "wide"), "--data-dir", folder_ / "data"},
-                     1, "no video");
-}
-
-TEST_F(BadDataSet, PictureOfAnotherSizeIsSkipped) {
-  const std::vector<std::string> arguments = Spoiled([](const fs::path& p) {
-    const TemporaryFolder other;
-    WriteSmallDataset(other / "set", {.frames = 2, .width = 160, .height = 120});
-    fs::copy_file(other / "set/rgb/0.033333.png", p / "rgb" / "0.033333.png",
-                  fs::copy_options::overwrite_existing);
-  });
-  Server server(arguments);
-  std::string err;
-  for (int i = 0; i < 60 && err.find("0.033333") == std::string::npos; ++i) {
-    server.process().Wait(std::chrono::milliseconds(50));
-    err = server.process().err();
-  }
-  const auto at = err.find("0.033333");
-  const auto begin = at == std::string::npos ? 0 : err.rfind('\n', at) + 1;
-  Row("start", "picture of 160 x 120 in a data set of 320 x 240",
-      err.substr(begin, err.find('\n', at) - begin), at != std::string::npos && IsWell(server));
 }
 
 TEST(BadStart, ArgumentsAreRefusedByName) {
@@ -213,10 +109,10 @@ TEST(BadStart, ArgumentsAreRefusedByName) {
   refuse("--grpc without a port", {"--source", source, "--grpc", "localhost"}, 2, "grpc");
   refuse("another address without --insecure", {"--source", source, "--grpc", "0.0.0.0:0"}, 2,
          "--insecure");
-  Write(folder / "broken.toml", "this is = = not TOML");
+  WriteText(folder / "broken.toml", "this is = = not TOML");
   refuse("--config that is not TOML", {"--source", source, "--config", folder / "broken.toml"}, 2,
          "broken.toml");
-  Write(folder / "unknown.toml", "colour_of_the_sky = 3\n");
+  WriteText(folder / "unknown.toml", "colour_of_the_sky = 3\n");
   refuse("--config with an unknown key", {"--source", source, "--config", folder / "unknown.toml"},
          2, "colour_of_the_sky");
   refuse("--config is a folder", {"--source", source, "--config", folder.path()}, 2, "is a folder");
@@ -229,14 +125,14 @@ TEST(BadStart, ArgumentsAreRefusedByName) {
   const std::string deep(100'000, '[');
   for (const std::string& text :
        {"source = " + deep, "source = " + deep + std::string(100'000, ']'), deep}) {
-    Write(folder / "deep.toml", text);
+    WriteText(folder / "deep.toml", text);
     refuse("--config with 100 000 brackets", {"--source", source, "--config", folder / "deep.toml"},
            2, "deep.toml");
   }
-  Write(folder / "slow.toml", "[video]\nbit_rate_bit_s = 1\n");
+  WriteText(folder / "slow.toml", "[video]\nbit_rate_bit_s = 1\n");
   refuse("video of 1 bit/s", {"--source", source, "--config", folder / "slow.toml"}, 2,
          "50000 to 100000000");
-  Write(folder / "nan.toml", "[gaze]\nrate_deg_s = nan\n");
+  WriteText(folder / "nan.toml", "[gaze]\nrate_deg_s = nan\n");
   refuse("a setting that is NaN", {"--source", source, "--config", folder / "nan.toml"}, 1,
          "rate_deg_s");
   for (const char* time : {"1e30", "inf", "nan", "-1", "1e10"}) {
@@ -250,7 +146,7 @@ TEST(BadStart, DataFolderAndPortsAreRefusedByName) {
   TemporaryFolder folder;
   WriteSmallDataset(folder / "set", {.frames = 5});
   const std::string source = "dataset:" + (folder / "set");
-  Write(folder / "file", "a file where a folder should be");
+  WriteText(folder / "file", "a file where a folder should be");
   ExpectRefusedStart("--data-dir is a file", {"--source", source, "--data-dir", folder / "file"}, 1,
                      "file");
   {
@@ -262,11 +158,11 @@ TEST(BadStart, DataFolderAndPortsAreRefusedByName) {
     ASSERT_EQ(first.process().Wait(std::chrono::seconds(5)), 0);
   }
   fs::create_directories(folder / "emptied");
-  Write(folder / "emptied/annotations.sqlite", "");
+  WriteText(folder / "emptied/annotations.sqlite", "");
   ExpectRefusedStart("data base of 0 bytes", {"--source", source, "--data-dir", folder / "emptied"},
                      1, "0 bytes");
   for (const auto& entry : fs::directory_iterator(folder / "data")) {
-    if (entry.is_regular_file()) Write(entry.path(), std::string(8192, '\x5a'));
+    if (entry.is_regular_file()) WriteText(entry.path(), std::string(8192, '\x5a'));
   }
   ExpectRefusedStart("data base overwritten with rubbish",
                      {"--source", source, "--data-dir", folder / "data"}, 1, "data");

@@ -110,8 +110,8 @@ TEST(ServerConfig, ABadFileIsNamedWithItsKey) {
   EXPECT_THAT(Error({"--config", "/nowhere.toml"}), HasSubstr("/nowhere.toml"));
   EXPECT_THAT(Error({"--config", Toml("sorce = \"sim:desk\"")}), HasSubstr("unknown key sorce"));
   EXPECT_THAT(Error({"--config", Toml("[video]\nrate = 1")}), HasSubstr("video.rate"));
-  EXPECT_THAT(Error({"--config", Toml("source = 4")}), HasSubstr("saccade_config_test.toml"));
-  EXPECT_THAT(Error({"--config", Toml("source = ")}), HasSubstr("saccade_config_test.toml"));
+  EXPECT_THAT(Error({"--config", Toml("source = 4")}), HasSubstr("saccade_config_test_"));
+  EXPECT_THAT(Error({"--config", Toml("source = ")}), HasSubstr("saccade_config_test_"));
 }
 
 TEST(ServerConfig, NumbersOutsideTheirRangeAreRefusedByName) {
@@ -137,7 +137,7 @@ TEST(ServerConfig, WhatIsNoConfigurationFileIsNamed) {
   EXPECT_THAT(Error({"--config", "/dev/zero"}), HasSubstr("is a device"));
   EXPECT_THAT(Error({"--config", std::string(5000, 'x')}), HasSubstr("--config"));
   EXPECT_THAT(Error({"--config", Toml("source = " + std::string(100'000, '['))}),
-              AllOf(HasSubstr("saccade_config_test.toml"), HasSubstr("nested")));
+              AllOf(HasSubstr("saccade_config_test_"), HasSubstr("nested")));
 }
 
 TEST(ServerConfig, VersionPrintsAndGivesNothing) {

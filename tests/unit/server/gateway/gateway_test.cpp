@@ -186,6 +186,7 @@ TEST_F(GatewayTest, MalformedRequestsGetAStatusAndNoCall) {
   }
   HttpClient garbage(port());
   garbage.Send("\x16\x03\x01 this is not HTTP\r\n\r\n");
+  EXPECT_EQ(garbage.ReadReply().status, 400);
   EXPECT_TRUE(garbage.ClosedWithin(seconds(3)));
 }
 

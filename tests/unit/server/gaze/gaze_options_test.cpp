@@ -28,7 +28,7 @@ TEST(GazeOptions, ReadsItsTableAndLeavesTheRest) {
 TEST(GazeOptions, ErrorsNameFileKeyAndRemedy) {
   for (const auto& [text, words] : {std::pair("[gaze]\nspeed = 3\n", "gaze.speed: unknown key"),
                                     std::pair("[gaze]\nrate_deg_s = -1\n", "gaze.rate_deg_s"),
-                                    std::pair("[gaze]\nrate_deg_s = nan\n", "give a number from"),
+                                    std::pair("[gaze]\nrate_deg_s = nan\n", "give a number"),
                                     std::pair("[gaze]\nexplore_when_idle = 1\n", "true or false"),
                                     std::pair("gaze = 1\n", "not a table")}) {
     GazeOptions options;

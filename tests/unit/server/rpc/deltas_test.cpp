@@ -137,8 +137,11 @@ TEST(AnnotationDelta, EditsGoAtOnceAndNoiseDoesNot) {
   EXPECT_TRUE(publish(300'000'000));
   note.anchor.state = AnchorState::kPaused;
   EXPECT_TRUE(publish(300'000'001));
+  note.anchor.reason = "in other words";
+  EXPECT_FALSE(publish(300'000'002));
+  EXPECT_TRUE(publish(1'400'000'000)) << "words alone go once a second";
   event.annotations = std::make_shared<AnnotationList>();
-  ASSERT_TRUE(reader.Next(log.Next(event, 300'000'002), delta));
+  ASSERT_TRUE(reader.Next(log.Next(event, 1'400'000'001), delta));
   EXPECT_THAT(delta.removed_ids(), ::testing::ElementsAre("a"));
 }
 

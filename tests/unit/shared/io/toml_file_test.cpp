@@ -30,7 +30,7 @@ TEST(TomlFile, IsParsed) {
   const absl::StatusOr<toml::value> root = Parse("a = 1\n[b]\nc = [[1.5], [2.5]]\n");
   ASSERT_TRUE(root.ok()) << root.status();
   EXPECT_EQ(toml::find<int>(*root, "a"), 1);
-  EXPECT_THAT(Parse("a = = 1").status().message(), HasSubstr("saccade_toml_file_test.toml"));
+  EXPECT_THAT(Parse("a = = 1").status().message(), HasSubstr("saccade_toml_file_test_"));
 }
 
 // Each ended the process (toml11 recurses) before nesting was looked at.
@@ -44,7 +44,7 @@ TEST(TomlFile, DeepNestingIsRefusedInWords) {
         "x = '''\n'''''\na = " + Times(n, "["), "x = \"\"\"\\\"\"\"\"\na = " + Times(n, "[")}) {
     const absl::Status status = Parse(text).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << text.substr(0, 40);
-    EXPECT_THAT(status.message(), HasSubstr("saccade_toml_file_test.toml")) << text.substr(0, 40);
+    EXPECT_THAT(status.message(), HasSubstr("saccade_toml_file_test_")) << text.substr(0, 40);
   }
   EXPECT_THAT(CheckTomlDepth("x = 1\na = " + Times(n, "[")).message(),
               AllOf(HasSubstr("line 2"), HasSubstr("64")));
