@@ -1,8 +1,8 @@
 #include "server/app/engine.hpp"
 
 #include <absl/strings/str_cat.h>
-#include <malloc.h>
 #include <absl/strings/str_format.h>
+#include <malloc.h>
 
 #include <condition_variable>
 #include <mutex>
