@@ -41,7 +41,7 @@ export function landingInVideo(
 
 /**
  * A click on the map: a feature where one is close enough, else the ray into the scene. Nothing where
- * only the depth of other places could be guessed: in an empty corner nothing is to be seen.
+ * only the depth of places elsewhere could be guessed: in an empty corner nothing is to be seen.
  */
 export function landingInMap(
   view: View,
@@ -53,7 +53,8 @@ export function landingInMap(
   const guess = guessAt(view, pixel, seen);
   const nearest = seen[0];
   if (!guess || !ray || !nearest) return undefined;
-  if (guess.how !== 'feature' && guess.how !== 'plane') return undefined;
+  const isGuessed = guess.how === 'nearby depth' || guess.how === 'unknown depth';
+  if (isGuessed && nearest.away > NEAR_PX) return undefined;
   if (nearest.away <= SNAP_PX) {
     const { id, pointInWorld } = nearest.feature;
     return { ...guess, pointInWorld, target: { kind: 'feature', featureId: id } };
