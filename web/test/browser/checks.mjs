@@ -158,7 +158,7 @@ async function placeMany(context, pane, aim) {
   const used = new Map(); // object -> how often
   const refusals = [];
   let count = 0;
-  for (const end = Date.now() + 150_000; count < PER_PANE && Date.now() < end; ) {
+  for (const end = Date.now() + 300_000; count < PER_PANE && Date.now() < end; ) {
     const before = await expert.annotationIds();
     const click = await aim(context, used);
     if (!click) {
