@@ -26,12 +26,13 @@ TEST_F(Malformed, Http2IsRefusedAndNotKept) {
       tally_.Add(socket.ClosedByPeer(milliseconds(60)) ? "closed" : "held");
       ASSERT_TRUE(target_->Alive()) << one.name << ": " << target_->Obituary();
     }
-    held_kib.push_back(target_->vitals().rss_kib);
+    held_kib.push_back(SteadyMemory());
   }
   tally_.Add("KiB more after the first", held_kib[1] - held_kib[0]);
   tally_.Add("KiB more after the second", held_kib[2] - held_kib[1]);
   EXPECT_LT(held_kib[1] - held_kib[0], 160 * 1024);
-  EXPECT_LT(held_kib[2] - held_kib[1], 40 * 1024);
+  // As much as the server lets the allocator keep unused (Engine: what it gives back).
+  EXPECT_LT(held_kib[2] - held_kib[1], 64 * 1024);
 }
 
 TEST_F(Malformed, MessagesFromDescriptorsEndNothing) {
