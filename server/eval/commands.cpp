@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "server/capture/dataset.hpp"
+#include "server/eval/altered_source.hpp"
 #include "server/eval/frame_range.hpp"
 #include "server/eval/run.hpp"
 #include "server/eval/run_recorder.hpp"
@@ -14,23 +15,46 @@
 
 namespace saccade {
 
+namespace {
+
+absl::StatusOr<Alterations> AlterationsOf(const RunArguments& arguments) {
+  Alterations alterations;
+  for (const std::string& text : arguments.drop) {
+    const absl::StatusOr<FrameRange> range = ParseFrameRange(text, "--drop");
+    if (!range.ok()) return range.status();
+    alterations.drop.push_back(*range);
+  }
+  alterations.every = arguments.every;
+  if (!arguments.freeze.empty()) {
+    const absl::StatusOr<Freeze> freeze = ParseFreeze(arguments.freeze);
+    if (!freeze.ok()) return freeze.status();
+    alterations.freeze = *freeze;
+  }
+  return alterations;
+}
+
+}  // namespace
+
 absl::Status RunCommand(const RunArguments& arguments) {
+  absl::StatusOr<Alterations> alterations = AlterationsOf(arguments);
+  if (!alterations.ok()) return alterations.status();
   const absl::StatusOr<FrameRange> range = ParseFrameRange(arguments.frames);
   if (!range.ok()) return range.status();
   SourceOptions options;
   options.first_frame = range->first;
   options.end_frame = range->end;
-  const auto source = OpenDataset(arguments.dataset, options);
-  if (!source.ok()) return source.status();
+  auto opened = OpenDataset(arguments.dataset, options);
+  if (!opened.ok()) return opened.status();
+  const std::unique_ptr<FrameSource> source = Altered(*std::move(opened), *std::move(alterations));
   Trajectory truth;
   if (MayExist(arguments.dataset / "groundtruth.txt")) {
     absl::StatusOr<Trajectory> loaded = LoadTrajectory(arguments.dataset / "groundtruth.txt");
     if (!loaded.ok()) return loaded.status();
     truth = *std::move(loaded);
   }
-  const auto session = MakeTrackerSession((*source)->info(), arguments.tracker);
+  const auto session = MakeTrackerSession(source->info(), arguments.tracker);
   if (!session.ok()) return session.status();
-  const auto report = RunTracker(**source, session->track, truth, arguments.out);
+  const auto report = RunTracker(*source, session->track, truth, arguments.out);
   if (!report.ok()) return report.status();
   std::cout << (arguments.json ? report->dump(2) + "\n" : SummaryTable(*report));
   return absl::OkStatus();

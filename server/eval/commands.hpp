@@ -18,7 +18,10 @@ struct TrackerArguments {
 struct RunArguments {
   std::filesystem::path dataset, out;
   TrackerArguments tracker;
-  std::string frames;  // A:B, empty for all
+  std::string frames;             // A:B, empty for all
+  std::vector<std::string> drop;  // A:B each
+  std::uint64_t every = 1;
+  std::string freeze;  // K:SECONDS, empty for none
   bool json = false;
 };
 struct ScoreArguments {

@@ -5,12 +5,12 @@
 
 namespace saccade {
 
-absl::StatusOr<FrameRange> ParseFrameRange(absl::string_view text) {
+absl::StatusOr<FrameRange> ParseFrameRange(absl::string_view text, absl::string_view option) {
   FrameRange range;
   if (text.empty()) return range;
-  const auto refuse = [text] {
+  const auto refuse = [text, option] {
     return absl::InvalidArgumentError(
-        absl::StrCat("--frames '", text,
+        absl::StrCat(option, " '", text,
                      "' is not a range A:B with A < B (half open, from zero), such as 0:100"));
   };
   const std::size_t colon = text.find(':');

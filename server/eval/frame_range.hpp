@@ -14,7 +14,9 @@ struct FrameRange {
   std::optional<std::uint64_t> end;
 };
 
-/// "A:B", "A:", ":B" or nothing (all). InvalidArgument: anything else, or an empty range.
-absl::StatusOr<FrameRange> ParseFrameRange(absl::string_view text);
+/// "A:B", "A:", ":B" or nothing (all). InvalidArgument: anything else, or an empty range; the
+/// message names `option`.
+absl::StatusOr<FrameRange> ParseFrameRange(absl::string_view text,
+                                           absl::string_view option = "--frames");
 
 }  // namespace saccade

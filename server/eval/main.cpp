@@ -57,6 +57,16 @@ void AddRun(CLI::App& app, RunArguments& arguments) {
                   "One tracker option as key=value; may be repeated")
       ->take_all();
   run->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
+  run->add_option("--drop", arguments.drop,
+                  "Half-open range A:B of frames to leave out, as if they had been lost; may be "
+                  "repeated")
+      ->take_all();
+  run->add_option("--every", arguments.every, "Only every Nth of the frames that remain")
+      ->check(NotNegative())
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  run->add_option("--freeze", arguments.freeze,
+                  "K:SECONDS: from frame K on its picture stands still so long");
   run->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/eval/false_tracked.hpp"
 #include "server/eval/registration.hpp"
 
 namespace saccade {
@@ -42,6 +43,16 @@ void PixelRunTotals::Add(const PixelRunTotals& other) {
   lost_frames += other.lost_frames;
   initialising_frames += other.initialising_frames;
   coasting_frames += other.coasting_frames;
+  tracked_frames += other.tracked_frames;
+  lost_after_start_frames += other.lost_after_start_frames;
+  false_tracked_frames += other.false_tracked_frames;
+  if (other.scale_windows) {
+    ScaleWindows all = scale_windows.value_or(*other.scale_windows);
+    all.min = std::min(all.min, other.scale_windows->min);
+    all.max = std::max(all.max, other.scale_windows->max);
+    all.windows = (scale_windows ? all.windows : 0) + other.scale_windows->windows;
+    scale_windows = all;
+  }
   anchors += other.anchors;
   refused_clicks += other.refused_clicks;
   views += other.views;
@@ -102,6 +113,9 @@ absl::StatusOr<std::optional<double>> PixelRun::Run(PixelRunTotals& totals) {
   totals.lost_frames += recorder_.CountOf(FrameVerdict::kLost);
   totals.initialising_frames += recorder_.CountOf(FrameVerdict::kInitialising);
   totals.coasting_frames += recorder_.CountOf(FrameVerdict::kCoasting);
+  totals.tracked_frames += recorder_.CountOf(FrameVerdict::kTracked);
+  totals.lost_after_start_frames += recorder_.lost_after_start();
+  totals.scale_windows = ScaleOfWindows(claimed_);
   totals.anchors += clicked_.size();
   for (const absl::Status& status :
        {recorder_.Close(), truth_file_.Close(), anchors_file_.Close()}) {
@@ -126,6 +140,12 @@ absl::Status PixelRun::Step(const Frame& frame, PixelRunTotals& totals) {
   FrameVerdict verdict = VerdictOf(*snapshot);
   const bool pose_published =
       verdict == FrameVerdict::kTracked || verdict == FrameVerdict::kCoasting;
+  if (verdict == FrameVerdict::kTracked) {
+    const Rigid3& claimed = snapshot->world_from_camera;
+    claimed_.push_back({frame.capture_time_ns, claimed, truth});
+    const double error_m = (claimed.translation - truth.translation).norm();
+    totals.false_tracked_frames += !(error_m <= kFalseTracked_m) ? 1 : 0;
+  }
   if (pose_published && IsLost(snapshot->world_from_camera, truth)) verdict = FrameVerdict::kLost;
   if (const absl::Status status = recorder_.Add(frame, *snapshot, cost, verdict); !status.ok()) {
     return status;

@@ -10,6 +10,7 @@
 #include "server/anchors/anchor_manager.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/eval/run_recorder.hpp"
+#include "server/eval/scale_windows.hpp"
 #include "server/eval/statistics.hpp"
 #include "server/eval/tracker_session.hpp"
 #include "server/sim/sim_source.hpp"
@@ -27,6 +28,9 @@ struct ClickPlan {
 /// Sums over one run; those of several runs add up.
 struct PixelRunTotals {
   std::uint64_t frames = 0, lost_frames = 0, initialising_frames = 0, coasting_frames = 0;
+  std::uint64_t tracked_frames = 0, lost_after_start_frames = 0;
+  std::uint64_t false_tracked_frames = 0;  // published as tracked, more than 15 cm from truth
+  std::optional<ScaleWindows> scale_windows;
   std::uint64_t anchors = 0, refused_clicks = 0;
   std::uint64_t views = 0;           // (anchor, frame) with truth in view
   std::uint64_t tracking_views = 0;  // of those, anchor state TRACKING
@@ -84,6 +88,7 @@ class PixelRun {
   std::unique_ptr<AnchorManager> anchors_;
   std::vector<Clicked> clicked_;
   Trajectory truth_;
+  std::vector<PosePair> claimed_;  // poses published as tracked, wrong ones too
   int clicks_ = 0;
 };
 

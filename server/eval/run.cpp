@@ -48,6 +48,10 @@ absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const Tra
     }
   }
   if (const absl::Status status = recorder->Close(); !status.ok()) return status;
+  if (recorder->frames() == 0) {
+    return absl::InvalidArgumentError(
+        "no frame is left of the recording; look at --frames, --drop and --every");
+  }
   nlohmann::ordered_json report = recorder->Report(source.bad_frames());
   if (!truth.empty()) {
     const auto interval_ns = static_cast<Timestamp>(1e9 / source.info().camera->intrinsics().fps);

@@ -5,6 +5,9 @@
 
 #include <cmath>
 
+#include "server/eval/false_tracked.hpp"
+#include "server/eval/scale_windows.hpp"
+
 namespace saccade {
 namespace {
 
@@ -20,6 +23,23 @@ Json TimesOf(const Sample& sample) {
           {"p95", Rounded(sample.Percentile(95))},
           {"p99", Rounded(sample.Percentile(99))},
           {"max", Rounded(sample.Max())}};
+}
+
+void AddScaleAndFalse(const std::vector<PosePair>& pairs, bool metric, Json& report) {
+  const std::optional<ScaleWindows> windows = ScaleOfWindows(pairs);
+  report["scale_windows"] =
+      windows ? Json{{"min", windows->min}, {"max", windows->max}, {"windows", windows->windows}}
+              : Json(nullptr);
+  const FalseTracked wrong = CountFalseTracked(pairs, metric ? Alignment::kSe3 : Alignment::kSim3);
+  const bool known = pairs.size() >= 3;
+  report["false_tracked_frames"] = known ? Json(wrong.frames) : Json(nullptr);
+  report["false_tracked"] =
+      known ? Json{{"against_before", wrong.against_before},
+                   {"against_whole", wrong.against_whole},
+                   {"worst_m", wrong.worst_m},
+                   {"first_s",
+                    wrong.first_time_ns ? Json(Seconds(*wrong.first_time_ns)) : Json(nullptr)}}
+            : Json(nullptr);
 }
 
 }  // namespace
@@ -69,6 +89,10 @@ absl::Status RunRecorder::Add(const Frame& frame, const MapSnapshot& snapshot,
                                      ToString(status), snapshot.attempted, snapshot.matched,
                                      cost.wall_ms, cost.cpu_ms));
   ++frames_;
+  if (CountOf(FrameVerdict::kTracked) > 0 &&
+      (status == FrameVerdict::kLost || status == FrameVerdict::kInitialising)) {
+    ++lost_after_start_;
+  }
   ++counts_[static_cast<std::size_t>(status)];
   metric_ = snapshot.metric;
   features_.Add(static_cast<double>(snapshot.features.size()));
@@ -93,6 +117,7 @@ Json RunRecorder::Report(std::uint64_t bad_frames) const {
   report["tracked_frames"] = CountOf(FrameVerdict::kTracked);
   report["coasting_frames"] = CountOf(FrameVerdict::kCoasting);
   report["lost_frames"] = CountOf(FrameVerdict::kLost);
+  report["lost_after_start_frames"] = lost_after_start_;
   report["bad_frames"] = bad_frames;
   report["metric"] = metric_;
   report["features"] = {{"mean", Rounded(features_.Mean())}, {"max", features_.Max()}};
@@ -133,15 +158,17 @@ void AddScores(const std::vector<PosePair>& pairs, bool metric, Json& report) {
   put("ate_sim3_deg", of(&TrajectoryScore::rotation_sim3_deg));
   put("rpe_1s_m", score.ok() ? score->rpe_1s_m : std::nullopt);
   put("rpe_1s_deg", score.ok() ? score->rpe_1s_deg : std::nullopt);
+  AddScaleAndFalse(pairs, metric, report);
 }
 
 std::string SummaryTable(const Json& report) {
   const auto count = [&](const char* key) { return report.value(key, std::uint64_t{0}); };
   std::string text = absl::StrFormat(
       "frames       %6d   (bad %d)\ninitialising %6d\ntracked      %6d\ncoasting     %6d\n"
-      "lost         %6d\nmetric       %6s\n",
+      "lost         %6d   (%d after the start)\nmetric       %6s\n",
       count("frames"), count("bad_frames"), count("initialising_frames"), count("tracked_frames"),
-      count("coasting_frames"), count("lost_frames"), report.value("metric", false) ? "yes" : "no");
+      count("coasting_frames"), count("lost_frames"), count("lost_after_start_frames"),
+      report.value("metric", false) ? "yes" : "no");
   const Json& features = report["features"];
   const Json& frame_ms = report["frame_ms"];
   absl::StrAppendFormat(&text, "features     %6.1f   (max %.0f)\n", features["mean"].get<double>(),
@@ -163,6 +190,14 @@ std::string SummaryTable(const Json& report) {
                           100 * report["rpe_1s_m"].get<double>(),
                           report["rpe_1s_deg"].get<double>());
   }
+  if (!report["scale_windows"].is_null()) {
+    absl::StrAppendFormat(&text, "scale 3 s    %6.3f to %.3f of the whole\n",
+                          report["scale_windows"]["min"].get<double>(),
+                          report["scale_windows"]["max"].get<double>());
+  }
+  absl::StrAppendFormat(&text, "false tracked %5d   (more than 15 cm off; worst %.1f cm)\n",
+                        count("false_tracked_frames"),
+                        100 * report["false_tracked"]["worst_m"].get<double>());
   return text;
 }
 

@@ -46,6 +46,8 @@ class RunRecorder {
   /// The published poses of tracked frames so far.
   const Trajectory& trajectory() const { return trajectory_; }
   std::uint64_t frames() const { return frames_; }
+  /// Frames after the first tracked one that were lost, relocalising or initialising again.
+  std::uint64_t lost_after_start() const { return lost_after_start_; }
   std::uint64_t CountOf(FrameVerdict verdict) const {
     return counts_[static_cast<std::size_t>(verdict)];
   }
@@ -61,14 +63,16 @@ class RunRecorder {
 
   OutputFile trajectory_file_, frames_file_;
   Trajectory trajectory_;
-  std::uint64_t frames_ = 0;
+  std::uint64_t frames_ = 0, lost_after_start_ = 0;
   std::array<std::uint64_t, 4> counts_{};
   bool metric_ = false;
   Sample features_, wall_ms_, cpu_ms_, predict_ms_, search_ms_, update_ms_, manage_ms_;
 };
 
-/// Adds ate_se3_m, ate_sim3_m, ate_null_m, scale, rpe_1s_m and rpe_1s_deg and their rotations;
-/// nulls where fewer than three poses have a truth. `metric`: relative errors without Sim3 scale.
+/// Adds ate_se3_m, ate_sim3_m, ate_null_m, scale, rpe_1s_m and rpe_1s_deg and their rotations,
+/// scale_windows (ScaleOfWindows), false_tracked_frames and false_tracked (FalseTracked); nulls
+/// where fewer than three poses have a truth. `pairs`: the poses published as tracked. `metric`:
+/// relative errors and false claims without Sim3 scale.
 void AddScores(const std::vector<PosePair>& pairs, bool metric, nlohmann::ordered_json& report);
 
 /// The report as a table for people, null error beside each ATE.

@@ -69,26 +69,32 @@ void AddRelativeErrors(const std::vector<PosePair>& pairs, double scale, Traject
 
 }  // namespace
 
-Similarity AlignPoints(const std::vector<Vector3d>& source, const std::vector<Vector3d>& target,
-                       Alignment alignment) {
-  const Vector3d source_mean = Mean(source), target_mean = Mean(target);
-  Matrix3d covariance = Matrix3d::Zero();
-  double variance = 0;
-  for (std::size_t i = 0; i < source.size(); ++i) {
-    covariance += (target[i] - target_mean) * (source[i] - source_mean).transpose();
-    variance += (source[i] - source_mean).squaredNorm();
-  }
-  const Eigen::JacobiSVD<Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+Similarity AlignMoments(const AlignmentMoments& moments, Alignment alignment) {
+  const Eigen::JacobiSVD<Matrix3d> svd(moments.covariance,
+                                       Eigen::ComputeFullU | Eigen::ComputeFullV);
   Vector3d signs = Vector3d::Ones();
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs.z() = -1;
   const Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
   Similarity result;
-  if (alignment == Alignment::kSim3 && variance > 1e-18) {
-    result.scale = svd.singularValues().dot(signs) / variance;
+  if (alignment == Alignment::kSim3 && moments.source_variance > 1e-20) {
+    result.scale = svd.singularValues().dot(signs) / moments.source_variance;
   }
   result.target_from_source.rotation = Eigen::Quaterniond(rotation).normalized();
-  result.target_from_source.translation = target_mean - result.scale * (rotation * source_mean);
+  result.target_from_source.translation =
+      moments.target_mean - result.scale * (rotation * moments.source_mean);
   return result;
+}
+
+Similarity AlignPoints(const std::vector<Vector3d>& source, const std::vector<Vector3d>& target,
+                       Alignment alignment) {
+  AlignmentMoments moments = {Mean(source), Mean(target), Matrix3d::Zero(), 0};
+  const double part = 1.0 / static_cast<double>(source.size());
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const Vector3d from_mean = source[i] - moments.source_mean;
+    moments.covariance += part * (target[i] - moments.target_mean) * from_mean.transpose();
+    moments.source_variance += part * from_mean.squaredNorm();
+  }
+  return AlignMoments(moments, alignment);
 }
 
 std::vector<PosePair> Associate(const Trajectory& estimate, const Trajectory& truth,

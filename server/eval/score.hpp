@@ -21,6 +21,15 @@ struct Similarity {
   }
 };
 
+/// What an alignment needs to know of two point sets: means over the points, of covariance
+/// (target - mean)(source - mean)^T and squared distance of the source from its mean.
+struct AlignmentMoments {
+  Eigen::Vector3d source_mean, target_mean;
+  Eigen::Matrix3d covariance;
+  double source_variance = 0;
+};
+Similarity AlignMoments(const AlignmentMoments& moments, Alignment alignment);
+
 /// Least-squares alignment of point sets of the same size (at least one point).
 /// Source: Umeyama, "Least-squares estimation of transformation parameters between two point
 /// patterns", PAMI 13(4), 1991. Collinear points leave a rotation free: any one is taken.

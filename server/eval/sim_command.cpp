@@ -39,6 +39,12 @@ Json PixelReport(const SimArguments& arguments, const PixelRunTotals& totals, co
   report["runs"] = arguments.runs;
   report["frames"] = totals.frames;
   report["lost_frames"] = totals.lost_frames;
+  report["tracked_frames"] = totals.tracked_frames;
+  report["lost_after_start_frames"] = totals.lost_after_start_frames;
+  report["false_tracked_frames"] = totals.false_tracked_frames;
+  report["scale_windows"] = totals.scale_windows ? Json{{"min", totals.scale_windows->min},
+                                                        {"max", totals.scale_windows->max}}
+                                                 : Json(nullptr);
   report["initialising_frames"] = totals.initialising_frames;
   report["coasting_frames"] = totals.coasting_frames;
   report["anchors"] = totals.anchors;

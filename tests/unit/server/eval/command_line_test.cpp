@@ -41,10 +41,11 @@ class SaccadeEval : public testing::Test {
 };
 
 TEST_F(SaccadeEval, BadUsageExitsWithTwoAndOneLine) {
-  for (const char* arguments : {"", "dance", "run", "run --dataset x",
-                                "score --estimate a --truth b "
-                                "--align none",
-                                "sim --scenario points --runs 0 --out x"}) {
+  for (const char* arguments :
+       {"", "dance", "run", "run --dataset x",
+        "score --estimate a --truth b "
+        "--align none",
+        "sim --scenario points --runs 0 --out x", "run --dataset x --out y --every 0"}) {
     const Result result = Run(arguments);
     EXPECT_EQ(result.exit_code, 2) << arguments;
     EXPECT_EQ(Lines(result.err), 1) << result.err;
@@ -62,6 +63,8 @@ TEST_F(SaccadeEval, FailureExitsWithOneAndNamesTheThing) {
   };
   fails("run --dataset /nowhere --out /tmp/x", "/nowhere: no such folder");
   fails("run --dataset /nowhere --out /tmp/x --frames 5:2", "--frames '5:2'");
+  fails("run --dataset /nowhere --out /tmp/x --drop 5:2", "--drop '5:2'");
+  fails("run --dataset /nowhere --out /tmp/x --freeze 5", "--freeze '5'");
   fails("score --estimate /nowhere.tum --truth /nowhere.tum", "/nowhere.tum: cannot be opened");
   fails("sim --scenario dance --out /tmp/x", "'dance' is unknown; use one of points");
 }
@@ -113,6 +116,16 @@ TEST_F(SaccadeEval, RecordWritesARecordingThatRuns) {
   EXPECT_GT(report["tracked_frames"].get<int>(), 40);
   EXPECT_LT(report["ate_sim3_m"].get<double>(), 0.01);
 
+  const Result thinned =
+      Run("run --dataset " + recording.string() +
+          " --drop 20:30 --every 2 --freeze 40:0.2 --json --out " + (folder_ / "thinned").string());
+  ASSERT_EQ(thinned.exit_code, 0) << thinned.err;
+  EXPECT_EQ(nlohmann::json::parse(thinned.out)["frames"].get<int>(), 25);
+  const Result nothing = Run("run --dataset " + recording.string() + " --drop : --out " +
+                             (folder_ / "nothing").string());
+  EXPECT_EQ(nothing.exit_code, 1);
+  EXPECT_NE(nothing.err.find("no frame is left"), std::string::npos) << nothing.err;
+
   const Result refused = Run("record --source sim:desk --frames 0:2 --out /proc/nowhere");
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.err.find("/proc/nowhere"), std::string::npos) << refused.err;
@@ -138,7 +151,8 @@ TEST_F(SaccadeEval, RecordingRunsTheSameTwiceAndHalfIsThePrefix) {
             count("frames"));
   EXPECT_EQ(count("frames"), 80);
   for (const char* key : {"bad_frames", "metric", "features", "frame_ms", "stage_ms", "ate_se3_m",
-                          "ate_sim3_m", "ate_null_m", "scale", "rpe_1s_m", "rpe_1s_deg"}) {
+                          "ate_sim3_m", "ate_null_m", "scale", "rpe_1s_m", "rpe_1s_deg",
+                          "scale_windows", "false_tracked_frames", "lost_after_start_frames"}) {
     EXPECT_TRUE(report.contains(key)) << key;
   }
 }

@@ -88,6 +88,9 @@ TEST_F(Run, CountsSumToFramesAndOnlyTrackedPosesAreWritten) {
   EXPECT_EQ(report->at("tracked_frames"), 14);
   EXPECT_EQ(report->at("coasting_frames"), 2);
   EXPECT_EQ(report->at("lost_frames"), 2);
+  EXPECT_EQ(report->at("lost_after_start_frames"), 2);
+  EXPECT_EQ(report->at("false_tracked_frames"), 0);
+  EXPECT_EQ(report->at("scale_windows"), nullptr);  // the run is shorter than a window
   EXPECT_EQ(report->at("bad_frames"), 3);
   EXPECT_EQ(report->at("metric"), true);
   EXPECT_EQ(report->at("features").at("max"), 19);
@@ -129,6 +132,26 @@ TEST_F(Run, TableShowsTheNullErrorBesideEachAte) {
   const std::string table = SummaryTable(*report);
   EXPECT_NE(table.find("ATE SE3        0.00 cm    standing still"), table.npos) << table;
   EXPECT_NE(table.find("ATE Sim3"), table.npos);
+}
+
+TEST_F(Run, FalseClaimsAndScaleAreTold) {
+  BlankSource source(200);
+  Trajectory truth;
+  for (FrameId id = 0; id < 200; ++id) {
+    truth.push_back({static_cast<Timestamp>(id) * 33'000'000, TruePose(id)});
+  }
+  const auto jumping = [](const Frame& frame) {
+    auto snapshot = std::make_shared<MapSnapshot>(*FakeTrack(frame));
+    if (frame.id >= 150 && frame.id < 155) snapshot->world_from_camera.translation.x() += 0.4;
+    return snapshot;
+  };
+  const auto report = RunTracker(source, jumping, truth, folder_);
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->at("false_tracked_frames"), 5);
+  EXPECT_NEAR(report->at("false_tracked").at("first_s").get<double>(), 150 * 0.033, 1e-9);
+  EXPECT_NEAR(report->at("scale_windows").at("min").get<double>(), 1.0, 0.05);
+  EXPECT_NE(SummaryTable(*report).find("false tracked     5"), std::string::npos)
+      << SummaryTable(*report);
 }
 
 TEST_F(Run, UnwritableFolderIsAnError) {
