@@ -73,6 +73,22 @@ struct Refinement {
   std::optional<Rigid3> world_from_camera;  // at the mark
 };
 
+/// A map that was found elsewhere, from the same pictures, for an empty filter.
+struct MapSeed {
+  struct Feature {
+    FeatureId id = 0;                                            // rising
+    int anchor = 0;                                              // index into `anchors`
+    Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();          // unit, in the anchor
+    Eigen::Matrix2d birth_covariance = Eigen::Matrix2d::Zero();  // of one match there [rad^2]
+    double inverse_range = 1.0;                                  // [1/m]
+  };
+  std::vector<Rigid3> anchors;  // world from camera, in order of time
+  std::vector<Feature> features;
+  double readout_s = 0.0;
+  /// Of [read-out | 6 of each anchor | 3 of each feature, tangent by TangentBasis].
+  Eigen::MatrixXd covariance;
+};
+
 struct FilterOptions {
   /// Jacobians at first estimates (slam-spec 1): always, or for the first updates of a map, while
   /// the present ones still jump. README: update.
@@ -108,6 +124,11 @@ class FilterState {
   void Reset(const CameraMotion& camera, const Matrix12d& covariance);
   /// Puts the camera elsewhere, without knowledge shared with the map (slam-spec 6).
   void ResetCamera(const CameraMotion& camera, const Matrix12d& covariance);
+
+  /// Forgets everything and takes a map over, as one whose first troubles are behind it; the camera
+  /// shares no knowledge with it yet. Ids of the clones, in the order of `seed.anchors`.
+  std::vector<AnchorPoseId> Seed(const MapSeed& seed, const CameraMotion& camera,
+                                 const Matrix12d& covariance);
 
   const FilterOptions& options() const { return options_; }
   int dim() const { return covariance_.dim(); }

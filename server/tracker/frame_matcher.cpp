@@ -263,6 +263,26 @@ RobustPose FrameMatcher::Solve(const CameraModel& camera, const PosePrior& prior
   return pose;
 }
 
+void FrameMatcher::Renew(const CameraModel& camera, const FilterState& filter,
+                         FrameMatches& matches, std::mt19937_64& random) const {
+  const PosePrior prior{filter.camera().world_from_camera, filter.PoseCovariance()};
+  std::erase_if(matches.in_view, [&](LandmarkMatch& match) {
+    const auto predicted = filter.Predicted(camera, match.id);
+    if (!predicted) return true;
+    match.predicted = *predicted;
+    match.point = filter.Point(match.id);
+    match.row_shift = match.d_readout * filter.readout_s();
+    match.found = match.accepted();
+    return false;
+  });
+  matches.pose = Solve(camera, prior, matches.in_view, random);
+  matches.attempted = matches.accepted = 0;
+  for (const LandmarkMatch& match : matches.in_view) {
+    matches.attempted += match.searched ? 1 : 0;
+    matches.accepted += match.accepted() ? 1 : 0;
+  }
+}
+
 FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel& camera,
                                  const FilterState& filter, const LandmarkMap& map,
                                  std::mt19937_64& random) {

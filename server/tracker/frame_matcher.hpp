@@ -50,6 +50,10 @@ class FrameMatcher {
   FrameMatches Match(const ImagePyramid& pyramid, const CameraModel& camera,
                      const FilterState& filter, const LandmarkMap& map, std::mt19937_64& random);
 
+  /// The same matches against a filter that has changed since; nothing is searched anew.
+  void Renew(const CameraModel& camera, const FilterState& filter, FrameMatches& matches,
+             std::mt19937_64& random) const;
+
   /// Sigma of a match at `pixel` [px].
   double PixelSigma(const CameraModel& camera, const Eigen::Vector2d& pixel) const;
 

@@ -86,6 +86,15 @@ void Refiner::Keep(const CameraModel& camera, const FilterState& filter,
   if (!ids.empty()) newest_feature_ = std::max(newest_feature_, ids.back());
 }
 
+void Refiner::Take(const Rigid3& world_from_camera, double distance,
+                   std::span<const GraphSighting> seen, std::span<const GraphBirth> births,
+                   std::optional<AnchorPoseId> clone) {
+  if (!options_.adjust) return;
+  const KeyframeId id = graph_.Add(world_from_camera, distance, seen, births);
+  if (clone) clones_[id] = *clone;
+  for (const GraphBirth& birth : births) newest_feature_ = std::max(newest_feature_, birth.id);
+}
+
 void Refiner::Start(std::int64_t frame, FilterState& filter) {
   if (!options_.adjust || !fresh_ || running_.valid()) return;
   auto job = graph_.MakeJob([&](FeatureId id) { return EstimateOf(filter, id); });

@@ -35,6 +35,9 @@ class Refiner {
   /// features were born in it or the camera has moved enough.
   void Keep(const CameraModel& camera, const FilterState& filter, const FrameMatches& matches,
             double inverse_range, const KeyframeGraph::LifeOf& life);
+  /// Remembers a keyframe of a start that was solved elsewhere, and the clone that stands for it.
+  void Take(const Rigid3& world_from_camera, double distance, std::span<const GraphSighting> seen,
+            std::span<const GraphBirth> births, std::optional<AnchorPoseId> clone);
   /// Starts an adjustment if there is something new and none is running.
   void Start(std::int64_t frame, FilterState& filter);
   /// Puts a finished one into the filter. True: the camera jumped by it, seen against the distance

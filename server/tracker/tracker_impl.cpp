@@ -48,7 +48,8 @@ Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
       starter_(source, options),
       monitor_(options),
       relocaliser_(MakeRelocaliserOptions(options)),
-      refiner_(options) {}
+      refiner_(options),
+      finder_(options) {}
 
 void Tracker::Impl::Reset() {
   filter_.Reset(CameraMotion(), Matrix12d::Zero());
@@ -59,14 +60,22 @@ void Tracker::Impl::Reset() {
   monitor_.Reset();
   relocaliser_.Clear();
   refiner_.Reset();
+  finder_.Reset();
   matches_ = FrameMatches();
   before_relocalisation_.reset();
-  started_ = metric_ = has_frame_ = false;
+  started_ = metric_ = held_ = has_frame_ = false;
   head_rate_rad_s_ = 0.0;
   frames_ = frames_lost_ = 0;
   home_ = 1;
   ++generation_;
   ++revision_;
+}
+
+void Tracker::Impl::StartAnew(const Frame& frame) {
+  Reset();
+  last_frame_ = frame;
+  has_frame_ = true;
+  Begin(frame);
 }
 
 std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
@@ -84,6 +93,8 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   has_frame_ = true;
   if (!started_) {
     Begin(frame);
+  } else if (monitor_.status() == TrackingStatus::kLost && !held_) {
+    StartAnew(frame);
   } else if (monitor_.status() == TrackingStatus::kLost) {
     refiner_.Drop(filter_);
     Recover(frame);
@@ -104,6 +115,7 @@ void Tracker::Impl::Begin(const Frame& frame) {
     return;
   }
   metric_ = start->metric;
+  held_ = metric_ || !options_.start;
   depth_ = start->depth;
   matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_, random_);
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/true, matcher_, filter_, map_,
@@ -116,12 +128,17 @@ void Tracker::Impl::Begin(const Frame& frame) {
   const int born = static_cast<int>(filter_.feature_count());
   matches_.attempted += born;
   matches_.accepted += born;
-  Remember(*frame.camera);
+  if (held_) {
+    Remember(*frame.camera);
+  } else {
+    finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_, matches_);
+  }
   if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
 }
 
 bool Tracker::Impl::Settled() const {
-  if (metric_ || frames_ >= kLongestSettling ||
+  if (!held_) return false;
+  if (options_.start || metric_ || frames_ >= kLongestSettling ||
       monitor_.status() != TrackingStatus::kInitialising) {
     return true;
   }
@@ -274,6 +291,14 @@ void Tracker::Impl::Manage(const Frame& frame) {
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;
+  if (!held_) {
+    if (telling && !covered) {
+      keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
+                   random_);
+    }
+    SeekStart(frame);
+    return;
+  }
   MoveHome();
   if (refiner_.Finish(frames_, depth_.inverse_range, filter_)) ++revision_;
   times_.waited_ms = refiner_.waited_ms();

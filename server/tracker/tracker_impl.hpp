@@ -8,6 +8,7 @@
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/map_keeper.hpp"
 #include "server/tracker/refiner.hpp"
+#include "server/tracker/start_finder.hpp"
 #include "server/tracker/starter.hpp"
 #include "server/tracker/status_monitor.hpp"
 #include "server/tracker/tracker.hpp"
@@ -21,7 +22,10 @@ class Tracker::Impl {
 
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame);
   void Reset();
-  void WaitForBackground() const { refiner_.Wait(); }
+  void WaitForBackground() const {
+    refiner_.Wait();
+    finder_.Wait();
+  }
   absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame, const Rigid3& world_from_camera,
                                         const Eigen::Vector2d& pixel, double depth_prior_m,
                                         double depth_sigma_m);
@@ -29,6 +33,8 @@ class Tracker::Impl {
 
  private:
   void Begin(const Frame& frame);
+  /// Lost before there was a map that one could come back to.
+  void StartAnew(const Frame& frame);
   void Follow(const Frame& frame, double dt);
   void Recover(const Frame& frame);
   bool Accept(const Relocalisation& found, const CameraModel& camera);
@@ -62,6 +68,10 @@ class Tracker::Impl {
   void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
   bool Settled() const;
+  /// Without a target, until the pictures hold the scale: tries to find a start, and takes it over.
+  void SeekStart(const Frame& frame);
+  /// Filter, map and keyframes anew, from a start that holds; the camera from this frame's matches.
+  void TakeOver(const FoundStart& start, const Frame& frame);
   std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times) const;
 
   SourceInfo source_;
@@ -76,6 +86,7 @@ class Tracker::Impl {
   StatusMonitor monitor_;
   Relocaliser relocaliser_;
   Refiner refiner_;
+  StartFinder finder_;
   ImagePyramid pyramid_;
 
   Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows
@@ -83,6 +94,7 @@ class Tracker::Impl {
   bool has_frame_ = false;
   bool started_ = false;
   bool metric_ = false;
+  bool held_ = false;  // the map's scale is: by a target, or by what was seen from different places
   double head_rate_rad_s_ = 0.0;  // mean, up to the newest frame; 0 without encoders
   bool suspended_ = false;        // the head turns too fast for this frame to be searched
   MapKeeper::DepthGuess depth_;

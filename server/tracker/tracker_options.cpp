@@ -35,6 +35,8 @@ const Key kKeys[] = {
      1e3},
     {"fej", &O::fej, 0, 1},
     {"fej_updates", &O::fej_updates, 0, 1e9},
+    {"start", &O::start, 0, 1},
+    {"start_scale_sigma", &O::start_scale_sigma, 1e-3, 10},
     {"adjust", &O::adjust, 0, 1},
     {"adjust_delay", &O::adjust_delay, 1, 1000},
     {"adjust_live", &O::adjust_live, 0, 1},

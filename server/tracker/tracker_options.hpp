@@ -63,6 +63,10 @@ struct TrackerOptions {
   double corner_min_score = 2000.0;    // see CornerOptions; plain walls must still give some
   double initial_depth_m = 1.0;        // of the first features without a target: sets the scale
 
+  // Start without a target.
+  bool start = true;  // wait until pictures hold the scale; false: as soon as some depths are known
+  double start_scale_sigma = 0.05;  // relative, of distances gone against distances seen
+
   // Bundle adjustment on another core.
   bool adjust = true;
   int adjust_delay = 2;      // frames from its start until its result is taken

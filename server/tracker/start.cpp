@@ -1,0 +1,65 @@
+// The part of the tracker that begins without a target (slam-spec 7).
+#include "server/tracker/tracker_impl.hpp"
+
+namespace saccade {
+namespace {
+
+// What is known of the camera between the newest keyframe of the start and this frame.
+constexpr double kPositionShare = 0.05;  // of the distance to what is in view
+constexpr double kAngleSigma_rad = 0.05;
+constexpr double kVelocityShare_1_s = 0.3;
+constexpr double kAngularVelocitySigma_rad_s = 0.5;
+
+}  // namespace
+
+void Tracker::Impl::SeekStart(const Frame& frame) {
+  finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_, matches_);
+  const auto found = finder_.Finish(frames_);
+  times_.waited_ms = finder_.waited_ms();
+  if (found) {
+    TakeOver(*found, frame);
+  } else {
+    finder_.Start(frames_, filter_);
+  }
+}
+
+void Tracker::Impl::TakeOver(const FoundStart& start, const Frame& frame) {
+  const double unit = 1.0 / start.inverse_range;
+  const double elapsed = Seconds(frame.capture_time_ns - start.newest_time_ns);
+  CameraMotion motion = filter_.WholeMotion();
+  const Rigid3 since = start.newest_before.Inverse() * motion.world_from_camera;
+  motion.world_from_camera = {(start.newest.rotation * since.rotation).normalized(),
+                              start.newest.translation + elapsed * start.velocity};
+  motion.velocity_m_s = start.velocity;
+  Vector12d sigma;
+  sigma << Eigen::Vector3d::Constant(kPositionShare * unit + 0.5 * elapsed * start.velocity.norm()),
+      Eigen::Vector3d::Constant(kAngleSigma_rad),
+      Eigen::Vector3d::Constant(kVelocityShare_1_s * unit),
+      Eigen::Vector3d::Constant(kAngularVelocitySigma_rad_s);
+  const std::vector<AnchorPoseId> clones =
+      filter_.Seed(start.seed, motion, sigma.cwiseAbs2().asDiagonal());
+  home_ = clones.front();
+  std::vector<FeatureId> gone;
+  for (const Landmark& landmark : map_.all()) {
+    if (!landmark.known && !filter_.Has(landmark.id)) gone.push_back(landmark.id);
+  }
+  map_.Remove(gone);
+  dormant_.Clear();
+  relocaliser_.Clear();
+  refiner_.Reset();
+  for (const FoundStart::Keyframe& keyframe : start.keyframes) {
+    std::optional<AnchorPoseId> clone;
+    if (keyframe.anchor >= 0) clone = clones[static_cast<std::size_t>(keyframe.anchor)];
+    refiner_.Take(keyframe.world_from_camera, unit, keyframe.sightings, keyframe.births, clone);
+  }
+  std::erase_if(matches_.in_view,
+                [&](const LandmarkMatch& match) { return !filter_.Has(match.id); });
+  matcher_.Renew(*frame.camera, filter_, matches_, random_);
+  Correct(*frame.camera);
+  depth_ = {start.inverse_range, 0.5 * start.inverse_range};
+  held_ = true;
+  finder_.Reset();
+  ++revision_;
+}
+
+}  // namespace saccade
