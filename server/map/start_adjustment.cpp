@@ -382,4 +382,28 @@ std::optional<StartSolution> SolveStart(const StartProblem& problem,
   return solution;
 }
 
+void ScaleTo(double range, StartSolution& solution) {
+  StartProblem& found = solution.problem;
+  std::vector<double> all;
+  for (const StartPoint& point : found.points) all.push_back(point.inverse_range);
+  std::nth_element(all.begin(), all.begin() + std::ssize(all) / 2, all.end());
+  const double median = all[all.size() / 2];
+  if (median <= 0.0) return;
+  const double scale = range * median;  // of lengths
+  const Vector3d origin = found.world_from_camera.front().translation;
+  Eigen::VectorXd by = Eigen::VectorXd::Ones(solution.covariance.rows());
+  Eigen::Index at = 1;
+  for (Rigid3& pose : found.world_from_camera) {
+    pose.translation = origin + scale * (pose.translation - origin);
+    by.segment<3>(at).setConstant(scale);
+    at += 6;
+  }
+  for (StartPoint& point : found.points) {
+    point.inverse_range /= scale;
+    by[at + 2] = 1.0 / scale;
+    at += 3;
+  }
+  solution.covariance = by.asDiagonal() * solution.covariance * by.asDiagonal();
+}
+
 }  // namespace saccade

@@ -69,4 +69,8 @@ struct StartSolution {
 /// Nothing: stopped, too little to solve, or no solution.
 std::optional<StartSolution> SolveStart(const StartProblem& problem, const std::atomic<bool>& stop);
 
+/// Changes the unit so that the median of the ranges is `range`; nothing that pictures tell
+/// changes.
+void ScaleTo(double range, StartSolution& solution);
+
 }  // namespace saccade

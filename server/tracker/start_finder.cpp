@@ -18,7 +18,6 @@ constexpr std::size_t kMostSolved = 12;  // keyframes of one problem, besides th
 constexpr int kFewestShared = 20;        // points that a keyframe shares with the newest
 constexpr double kParallaxSigmas = 1.5;  // root mean square that a turn leaves, before it is tried
 constexpr double kLeastNoise = 0.5;      // of R: patches seen from elsewhere are biased alike
-constexpr double kLeaving = 0.6;         // of the points that the first keyframe shared
 constexpr double kMargin = 4.5;          // half of chi squared: three sigmas
 constexpr int kFewestKnown = 12;         // points whose range is known
 constexpr double kLeastAgreeing = 0.8;   // of the sightings
@@ -164,18 +163,6 @@ std::vector<std::size_t> StartFinder::ChooseShots() const {
   return chosen;
 }
 
-double StartFinder::Shared(const Shot& first, const std::map<FeatureId, int>& solved) const {
-  int seen_first = 0, seen_still = 0;
-  for (const std::vector<Seen>* seen : {&first.births, &first.sightings}) {
-    for (const Seen& each : *seen) {
-      if (!solved.contains(each.id)) continue;
-      ++seen_first;
-      seen_still += FindSeen(shots_.back().sightings, each.id) != nullptr ? 1 : 0;
-    }
-  }
-  return seen_first > 0 ? static_cast<double>(seen_still) / seen_first : 1.0;
-}
-
 StartFinder::Job StartFinder::MakeJob(const FilterState& filter) const {
   Job job;
   job.shots = ChooseShots();
@@ -207,7 +194,6 @@ StartFinder::Job StartFinder::MakeJob(const FilterState& filter) const {
       job.problem.sightings.push_back({static_cast<int>(at), point->second, seen.ray});
     }
   }
-  job.shared = Shared(shots_[job.shots.front()], index);
   return job;
 }
 
@@ -223,9 +209,7 @@ void StartFinder::Start(std::int64_t frame, const FilterState& filter) {
 
 bool StartFinder::Holds(const StartEvidence& evidence) const {
   const double noise = std::max(kLeastNoise, evidence.noise);
-  // What leaves the view takes its evidence along: a start that is nearly held is better than none.
-  const double enough = (job_.shared < kLeaving ? 2.0 : 1.0) * options_.start_scale_sigma;
-  return noise * evidence.scale_sigma < enough && evidence.margin > kMargin &&
+  return noise * evidence.scale_sigma < options_.start_scale_sigma && evidence.margin > kMargin &&
          evidence.known_points >= kFewestKnown && evidence.agreeing >= kLeastAgreeing;
 }
 
@@ -237,9 +221,10 @@ std::optional<FoundStart> StartFinder::Finish(std::int64_t frame) {
     return std::nullopt;
   }
   StopWatch watch;
-  const auto solution = running_.get();
+  auto solution = running_.get();
   waited_ms_ = watch.Lap_ms();
   if (!solution || !Holds(solution->evidence)) return std::nullopt;
+  ScaleTo(options_.initial_depth_m, *solution);
   return Read(*solution);
 }
 

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <future>
-#include <map>
 #include <optional>
 #include <vector>
 
@@ -75,7 +74,6 @@ class StartFinder {
     StartProblem problem;
     std::vector<std::size_t> shots;
     std::vector<FeatureId> points;  // rising
-    double shared = 1.0;            // of what the first keyframe saw, that the newest still sees
   };
 
   static std::optional<Seen> See(const CameraModel& camera, FeatureId id,
@@ -87,8 +85,6 @@ class StartFinder {
   bool ShowsParallax() const;
   Job MakeJob(const FilterState& filter) const;
   std::vector<std::size_t> ChooseShots() const;
-  /// Of the points solved that `first` saw, the share that the newest shot still sees.
-  double Shared(const Shot& first, const std::map<FeatureId, int>& solved) const;
   bool Holds(const StartEvidence& evidence) const;
   FoundStart Read(const StartSolution& solution) const;
   FoundStart::Keyframe ReadKeyframe(std::size_t keyframe, const StartSolution& solution,

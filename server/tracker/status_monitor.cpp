@@ -9,6 +9,17 @@ constexpr double kBad = 0.13;           // [PT]
 constexpr int kConfirmations = 3;       // frames after a relocalisation
 constexpr double kConfirmed = 0.6;      // of attempts there (slam-spec 6)
 constexpr int kLongestSuspension = 60;  // frames
+// A view that jumps is found again by a few false matches that agree by chance: 5 of 20 did.
+constexpr double kDoubtful = 0.35;    // of attempts: below, the pose is not believed at once...
+constexpr double kConvincing = 0.45;  // ...until so many succeed...
+constexpr int kConvincingInRow = 3;   // ...in so many frames in a row
+constexpr int kFew = 8;               // matches: fewer need kFewShare of the attempts
+constexpr double kFewShare = 0.6;
+constexpr int kLongestDoubt = 15;  // frames
+
+bool Agree(int attempted, int accepted, double share) {
+  return accepted >= share * attempted && (accepted >= kFew || accepted >= kFewShare * attempted);
+}
 
 }  // namespace
 
@@ -41,7 +52,7 @@ void StatusMonitor::Confirm(int attempted, int accepted) {
   } else if (confirming_ == 0) {
     status_ = TrackingStatus::kTracking;
     window_.clear();
-    bad_in_row_ = blind_in_row_ = 0;
+    bad_in_row_ = blind_in_row_ = doubtful_in_row_ = unconvinced_ = 0;
   }
 }
 
@@ -65,7 +76,19 @@ void StatusMonitor::Record(int attempted, int accepted, bool settled) {
   Count(attempted, accepted, settled);
 }
 
+/// Whether the pose is to be believed; after one frame that is not, only when some others are.
+bool StatusMonitor::Believe(int attempted, int accepted) {
+  if (!Agree(attempted, accepted, kDoubtful)) {
+    unconvinced_ = kConvincingInRow;
+  } else if (unconvinced_ > 0) {
+    unconvinced_ = Agree(attempted, accepted, kConvincing) ? unconvinced_ - 1 : kConvincingInRow;
+  }
+  doubtful_in_row_ = unconvinced_ > 0 ? doubtful_in_row_ + 1 : 0;
+  return unconvinced_ == 0;
+}
+
 void StatusMonitor::Count(int attempted, int accepted, bool settled) {
+  const bool believed = !settled || Believe(attempted, accepted);
   window_.push_back({attempted, accepted});
   if (window_.size() > kWindow) window_.pop_front();
   const double share = ratio();
@@ -74,12 +97,13 @@ void StatusMonitor::Count(int attempted, int accepted, bool settled) {
                             : TrackingQuality::kPoor;
   bad_in_row_ = quality_ == TrackingQuality::kBad ? bad_in_row_ + 1 : 0;
   blind_in_row_ = accepted == 0 ? blind_in_row_ + 1 : 0;
-  if (bad_in_row_ >= options_.lost_after_bad || blind_in_row_ >= options_.lost_after_blind) {
+  if (bad_in_row_ >= options_.lost_after_bad || blind_in_row_ >= options_.lost_after_blind ||
+      doubtful_in_row_ >= kLongestDoubt) {
     status_ = TrackingStatus::kLost;
     quality_ = TrackingQuality::kBad;
-    bad_in_row_ = blind_in_row_ = 0;
+    bad_in_row_ = blind_in_row_ = doubtful_in_row_ = unconvinced_ = 0;
     window_.clear();
-  } else if (accepted < options_.coasting_below) {
+  } else if (accepted < options_.coasting_below || !believed) {
     status_ = TrackingStatus::kCoasting;
   } else {
     status_ = settled ? TrackingStatus::kTracking : TrackingStatus::kInitialising;

@@ -38,6 +38,7 @@ class StatusMonitor {
  private:
   void Confirm(int attempted, int accepted);
   void Count(int attempted, int accepted, bool settled);
+  bool Believe(int attempted, int accepted);
 
   TrackerOptions options_;
   TrackingStatus status_ = TrackingStatus::kInitialising;
@@ -48,6 +49,8 @@ class StatusMonitor {
   std::deque<Counts> window_;
   int bad_in_row_ = 0;
   int blind_in_row_ = 0;
+  int unconvinced_ = 0;  // frames that must agree before a pose is believed again
+  int doubtful_in_row_ = 0;
   int suspended_in_row_ = 0;
   int confirming_ = 0;  // frames left
   int confirmed_ = 0;

@@ -24,8 +24,29 @@ TEST(StatusMonitor, FewerThanFiveMatchesIsCoasting) {
   StatusMonitor monitor = Tracking();
   monitor.Record(50, 4, true);
   EXPECT_EQ(monitor.status(), TrackingStatus::kCoasting);
-  monitor.Record(50, 40, true);
+  for (int k = 0; k < 3; ++k) monitor.Record(50, 40, true);
   EXPECT_EQ(monitor.status(), TrackingStatus::kTracking);
+}
+
+TEST(StatusMonitor, WhatAFewMatchesAgreeOnIsBelievedWhenMoreDo) {
+  StatusMonitor monitor = Tracking();
+  monitor.Record(20, 5, true);  // after a gap: five of twenty agreed, 40 cm off
+  EXPECT_EQ(monitor.status(), TrackingStatus::kCoasting);
+  for (int k = 0; k < 2; ++k) monitor.Record(50, 30, true);
+  EXPECT_EQ(monitor.status(), TrackingStatus::kCoasting);
+  monitor.Record(50, 30, true);
+  EXPECT_EQ(monitor.status(), TrackingStatus::kTracking);
+}
+
+TEST(StatusMonitor, LastingDoubtIsLost) {
+  StatusMonitor monitor = Tracking();
+  int frames = 0;
+  while (monitor.status() != TrackingStatus::kLost && frames < 100) {
+    monitor.Record(50, 16, true);
+    EXPECT_NE(monitor.status(), TrackingStatus::kTracking);
+    ++frames;
+  }
+  EXPECT_EQ(frames, 15);
 }
 
 TEST(StatusMonitor, BlindFramesEndInLostAndStayThere) {
