@@ -39,7 +39,8 @@ void FrameRing::Trim() {
   };
   const auto limit_ns = static_cast<Timestamp>(options_.duration_s * 1e9);
   const Timestamp newest_ns = frames_.back().frame->capture_time_ns;
-  while (newest_ns - frames_.front().frame->capture_time_ns > limit_ns) pop();
+  // Either way: after a clock was set back, what came before is not from now on young.
+  while (std::abs(newest_ns - frames_.front().frame->capture_time_ns) > limit_ns) pop();
   while (bytes_ > options_.max_bytes && colored_from_ + 1 < frames_.size()) {
     std::shared_ptr<const Frame>& frame = frames_[colored_from_++].frame;
     auto grey_only = std::make_shared<Frame>(*frame);

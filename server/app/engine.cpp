@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "server/app/crop_view.hpp"
+#include "server/capture/gap.hpp"
 #include "shared/io/log.hpp"
 
 namespace saccade {
@@ -19,6 +20,7 @@ namespace {
 
 constexpr std::size_t kStillsWaiting = 8;
 constexpr Timestamp kSourceQuiet = 500'000'000;
+constexpr Timestamp kGapAgain = 5'000'000'000;
 
 const cv::Mat& PictureOf(const Frame& frame) {
   return frame.color.empty() ? frame.grey : frame.color;
@@ -153,6 +155,7 @@ void Engine::RunTracker(std::stop_token stop) {
 
 void Engine::Track(Frame frame) {
   const Timestamp begin_ns = MonotonicNow();
+  if (last_) TellGap(*last_->frame, frame);
   if (options_.mount && !options_.crop && !frame.mount) {
     frame.mount = options_.mount->AnglesAt(frame.capture_time_ns);
   }
@@ -180,6 +183,16 @@ void Engine::Track(Frame frame) {
   tracked_ns_ = end_ns;
   track_ms_.Add(end_ns, 1e-6 * static_cast<double>(end_ns - begin_ns));
   Publish(/*new_frame=*/true);
+}
+
+void Engine::TellGap(const Frame& before, const Frame& frame) {
+  if (!IsGap(before.capture_time_ns, frame.capture_time_ns)) return;
+  if (gap_told_ns_ != 0 && MonotonicNow() - gap_told_ns_ < kGapAgain) return;
+  gap_told_ns_ = MonotonicNow();
+  Log(absl::StrFormat(
+      "source %s: frame %d is stamped %.6g s after frame %d (stamps count "
+      "nanoseconds; was the clock set?): tracking starts anew",
+      facts_.source, frame.id, Seconds(frame.capture_time_ns - before.capture_time_ns), before.id));
 }
 
 void Engine::TellGaze(const Frame& frame) {
