@@ -2,8 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <malloc.h>
 
+#include <bit>
 #include <condition_variable>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "server/app/crop_view.hpp"
+#include "server/app/memory.hpp"
 #include "server/capture/gap.hpp"
 #include "shared/io/log.hpp"
 
@@ -26,14 +27,8 @@ const cv::Mat& PictureOf(const Frame& frame) {
   return frame.color.empty() ? frame.grey : frame.color;
 }
 
-// The allocator keeps what a flood needed for a moment. Asked rarely, and only for a lot: giving it
-// back holds each arena for some milliseconds.
-constexpr int kTrimEveryS = 10;
-constexpr std::size_t kFreedBytes = std::size_t{64} << 20;
-
-void GiveBackFreedMemory() {
-  if (::mallinfo2().fordblks > kFreedBytes) ::malloc_trim(0);
-}
+constexpr int kTrimEveryS = 2;
+constexpr int kCodeEveryS = 60;  // and after 1, 2, 4 ... seconds, while the start comes to its end
 
 }  // namespace
 
@@ -77,7 +72,7 @@ absl::StatusOr<std::unique_ptr<Engine>> Engine::Create(EngineOptions options,
       new Engine(std::move(options), std::move(source), std::move(tracker), sink));
   Engine* self = engine.get();
   absl::StatusOr<std::unique_ptr<AnnotationBook>> book = AnnotationBook::Open(
-      anchors, [self](FrameId id) { return self->ring_.Find(id); },
+      anchors, [self](FrameId id) { return self->ring_.Find(id, FrameRing::Want::kGrey); },
       [self](const Frame& frame, const Rigid3& world_from_camera, const Eigen::Vector2d& pixel,
              double depth_m, double sigma_m) {
         return self->tracker_->SeedFeature(frame, world_from_camera, pixel, depth_m, sigma_m);
@@ -280,6 +275,9 @@ void Engine::RunClock(std::stop_token stop) {
     sink_.OnStatistics(Statistics());
     for (const auto& view : views_) view->Tick();
     if (++seconds % kTrimEveryS == 0) GiveBackFreedMemory();
+    if (seconds % kCodeEveryS == 0 || std::has_single_bit(static_cast<unsigned>(seconds))) {
+      GiveBackUnusedCode();
+    }
     if (MonotonicNow() - tracked_ns_ > kSourceQuiet) inbox_.PutNewestIfEmpty({});
   }
 }
