@@ -50,7 +50,7 @@ void FrameRing::Push(PastFrame past) {
     held_.clear();
     bytes_ = packed_ = colored_from_ = 0;
   }
-  Entry entry{past.frame->id, past.frame->capture_time_ns, std::move(past), nullptr, 0};
+  Entry entry{past.frame->id, past.frame->capture_time_ns, std::move(past), nullptr, 0, false};
   entry.bytes = Bytes(entry.whole);
   bytes_ += entry.bytes;
   frames_.push_back(std::move(entry));
@@ -117,7 +117,7 @@ absl::StatusOr<FrameRing::Entry> FrameRing::Locate(FrameId id) const {
   const std::lock_guard lock(mutex_);
   if (frames_.empty()) return absl::NotFoundError("no frame has been captured yet; wait for video");
   for (const std::shared_ptr<const Packed>& held : held_) {
-    if (held->frame.head.id == id) return Entry{id, 0, {}, held, 0};
+    if (held->frame.head.id == id) return Entry{id, 0, {}, held, 0, true};
   }
   const FrameId first = frames_.front().id;
   const FrameId last = frames_.back().id;
@@ -139,15 +139,19 @@ absl::StatusOr<FrameRing::Entry> FrameRing::Locate(FrameId id) const {
     return absl::NotFoundError(absl::StrFormat(
         "frame %d was dropped before it was tracked; use the id of a picture you were sent", id));
   }
-  return *found;
+  Entry entry = *found;
+  entry.old = static_cast<std::size_t>(frames_.end() - found) > options_.max_unpacked;
+  return entry;
 }
 
 absl::StatusOr<PastFrame> FrameRing::Find(FrameId id, Want want) const {
   const absl::StatusOr<Entry> entry = Locate(id);
   if (!entry.ok()) return entry.status();
-  if (!entry->packed) return entry->whole;
+  if (!entry->packed && !entry->old) return entry->whole;
   try {
-    return entry->packed->Unpack(want);
+    // What the packer has not come to yet is answered as it will be: nothing depends on timing.
+    const auto packed = entry->packed ? entry->packed : PackOne(entry->whole, nullptr);
+    return packed ? packed->Unpack(want) : entry->whole;
   } catch (const std::exception&) {
     return absl::ResourceExhaustedError(
         absl::StrFormat("frame %d cannot be unpacked: no memory; try again", id));

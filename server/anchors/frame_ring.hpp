@@ -83,6 +83,7 @@ class FrameRing {
     PastFrame whole;
     std::shared_ptr<const Packed> packed;
     std::size_t bytes = 0;
+    bool old = false;  // in a copy: to be answered as packed
   };
 
   /// Null: no memory.

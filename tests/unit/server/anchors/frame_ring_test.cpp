@@ -177,6 +177,22 @@ TEST(FrameRing, TenSecondsOfFramesAndALargeMapTakeAQuarterOfWhatTheyTook) {
   EXPECT_LT(ring.bytes(), 100'000'000u);  // 450 MB as they came, of which 300 were kept
 }
 
+TEST(FrameRing, AnswersDoNotDependOnHowFarThePackerIs) {
+  FrameRing ring;
+  for (FrameId id = 0; id < 12; ++id) ring.Push({PictureLike(id, {64, 48}), SnapshotOf(id, 5, 5)});
+  std::vector<PastFrame> early;
+  for (FrameId id = 0; id < 12; ++id) early.push_back(*ring.Find(id));
+  ring.WaitUntilPacked();
+  for (FrameId id = 0; id < 12; ++id) {
+    const auto late = ring.Find(id);
+    EXPECT_EQ(cv::norm(late->frame->color, early[id].frame->color, cv::NORM_INF), 0) << id;
+    for (std::size_t k = 0; k < 10; ++k) {
+      EXPECT_EQ(late->snapshot->features[k].covariance_in_camera,
+                early[id].snapshot->features[k].covariance_in_camera);
+    }
+  }
+}
+
 TEST(FrameRing, AClockSetBackLeavesNothingOfTheTimeBefore) {
   FrameRing ring;
   constexpr Timestamp kHour_ns = 3'600'000'000'000;
