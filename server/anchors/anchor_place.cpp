@@ -263,7 +263,7 @@ PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPla
       // where the place is.
       const bool taught = seed->depth_known && seed->matched_count >= kManyMatches;
       if (taught && !place.seed_is_target && place.seen_s > kSettled_s) ForgetSeed(place);
-    } else if (place.seed_seen || now_ns - place.placed_ns > kSeedGraceNs) {
+    } else if (place.seed_seen || std::abs(now_ns - place.placed_ns) > kSeedGraceNs) {
       ForgetSeed(place);
       estimate = FromCluster(map, place);
     }

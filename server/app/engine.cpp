@@ -2,8 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <malloc.h>
 
+#include <bit>
 #include <condition_variable>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "server/app/crop_view.hpp"
+#include "server/app/memory.hpp"
+#include "server/capture/gap.hpp"
 #include "shared/io/log.hpp"
 
 namespace saccade {
@@ -19,19 +21,14 @@ namespace {
 
 constexpr std::size_t kStillsWaiting = 8;
 constexpr Timestamp kSourceQuiet = 500'000'000;
+constexpr Timestamp kGapAgain = 5'000'000'000;
 
 const cv::Mat& PictureOf(const Frame& frame) {
   return frame.color.empty() ? frame.grey : frame.color;
 }
 
-// The allocator keeps what a flood needed for a moment. Asked rarely, and only for a lot: giving it
-// back holds each arena for some milliseconds.
-constexpr int kTrimEveryS = 10;
-constexpr std::size_t kFreedBytes = std::size_t{64} << 20;
-
-void GiveBackFreedMemory() {
-  if (::mallinfo2().fordblks > kFreedBytes) ::malloc_trim(0);
-}
+constexpr int kTrimEveryS = 2;
+constexpr int kCodeEveryS = 60;  // and after 1, 2, 4 ... seconds, while the start comes to its end
 
 }  // namespace
 
@@ -75,7 +72,7 @@ absl::StatusOr<std::unique_ptr<Engine>> Engine::Create(EngineOptions options,
       new Engine(std::move(options), std::move(source), std::move(tracker), sink));
   Engine* self = engine.get();
   absl::StatusOr<std::unique_ptr<AnnotationBook>> book = AnnotationBook::Open(
-      anchors, [self](FrameId id) { return self->ring_.Find(id); },
+      anchors, [self](FrameId id) { return self->ring_.Find(id, FrameRing::Want::kGrey); },
       [self](const Frame& frame, const Rigid3& world_from_camera, const Eigen::Vector2d& pixel,
              double depth_m, double sigma_m) {
         return self->tracker_->SeedFeature(frame, world_from_camera, pixel, depth_m, sigma_m);
@@ -153,6 +150,7 @@ void Engine::RunTracker(std::stop_token stop) {
 
 void Engine::Track(Frame frame) {
   const Timestamp begin_ns = MonotonicNow();
+  if (last_) TellGap(*last_->frame, frame);
   if (options_.mount && !options_.crop && !frame.mount) {
     frame.mount = options_.mount->AnglesAt(frame.capture_time_ns);
   }
@@ -180,6 +178,16 @@ void Engine::Track(Frame frame) {
   tracked_ns_ = end_ns;
   track_ms_.Add(end_ns, 1e-6 * static_cast<double>(end_ns - begin_ns));
   Publish(/*new_frame=*/true);
+}
+
+void Engine::TellGap(const Frame& before, const Frame& frame) {
+  if (!IsGap(before.capture_time_ns, frame.capture_time_ns)) return;
+  if (gap_told_ns_ != 0 && MonotonicNow() - gap_told_ns_ < kGapAgain) return;
+  gap_told_ns_ = MonotonicNow();
+  Log(absl::StrFormat(
+      "source %s: frame %d is stamped %.6g s after frame %d (stamps count "
+      "nanoseconds; was the clock set?): tracking starts anew",
+      facts_.source, frame.id, Seconds(frame.capture_time_ns - before.capture_time_ns), before.id));
 }
 
 void Engine::TellGaze(const Frame& frame) {
@@ -267,6 +275,9 @@ void Engine::RunClock(std::stop_token stop) {
     sink_.OnStatistics(Statistics());
     for (const auto& view : views_) view->Tick();
     if (++seconds % kTrimEveryS == 0) GiveBackFreedMemory();
+    if (seconds % kCodeEveryS == 0 || std::has_single_bit(static_cast<unsigned>(seconds))) {
+      GiveBackUnusedCode();
+    }
     if (MonotonicNow() - tracked_ns_ > kSourceQuiet) inbox_.PutNewestIfEmpty({});
   }
 }

@@ -93,6 +93,9 @@ class Engine : public Backend {
   void RunTracker(std::stop_token stop);
   void RunClock(std::stop_token stop);
   void Track(Frame frame);
+  /// Says on stderr, at most every five seconds, that two frames in a row are too far apart in
+  /// time.
+  void TellGap(const Frame& before, const Frame& frame);
   void TellGaze(const Frame& frame);
   void Settle();
   void Publish(bool new_frame);
@@ -117,6 +120,7 @@ class Engine : public Backend {
   FrameClock clock_;
   std::optional<TrackedFrame> last_;
   std::shared_ptr<const MapSnapshot> published_snapshot_;
+  Timestamp gap_told_ns_ = 0;  // MonotonicNow() of the last word on a gap
 
   RollingStatistics captured_, track_ms_;
   std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, bad_frames_ = 0;

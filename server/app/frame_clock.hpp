@@ -11,7 +11,8 @@ namespace saccade {
 /// Brings capture times to the monotonic clock. Live sources are on it already; a recording has a
 /// clock of its own, and its frames count as captured at the latest possible moments that keep
 /// their distances and lie before their arrival. A recording that stood still for seconds (no file
-/// descriptor was free) goes on from where it was. A source that does not keep pace with any clock
+/// descriptor was free) goes on from where it was, and so does a live one whose clock was set. A
+/// source that does not keep pace with any clock
 /// (`paced` false: every frame as fast as it can) is captured when it arrives.
 class FrameClock {
  public:
@@ -26,6 +27,10 @@ class FrameClock {
       offset_ns_ = live ? 0 : difference;
       adapts_ = !live;
     }
+    if (!adapts_ && (difference < -kLiveNs || difference > kClockSetNs)) {
+      adapts_ = true;  // the camera's clock was set: from here on as a recording's
+      offset_ns_ = difference;
+    }
     if (adapts_) {
       const bool stood_still = difference - *offset_ns_ > kStoodStillNs;
       offset_ns_ = stood_still ? difference : std::min(*offset_ns_, difference);
@@ -35,6 +40,7 @@ class FrameClock {
 
  private:
   static constexpr Timestamp kLiveNs = 1'000'000'000;
+  static constexpr Timestamp kClockSetNs = 60'000'000'000;  // no live frame is so late
   static constexpr Timestamp kStoodStillNs = 2'000'000'000;
   const bool paced_;
   std::optional<Timestamp> offset_ns_;

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/app/engine.hpp"
+#include "server/app/memory.hpp"
 #include "server/app/open_source.hpp"
 #include "server/app/server_config.hpp"
 #include "server/app/shutdown.hpp"
@@ -140,6 +141,7 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
 }
 
 int Main(int argc, char** argv) {
+  ShareHeaps();
   Shutdown& shutdown = Shutdown::Listen();
   const auto config = ServerConfig::FromCommandLine(argc, argv);
   if (!config.ok()) {

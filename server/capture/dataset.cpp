@@ -1,6 +1,7 @@
 #include "server/capture/dataset.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <atomic>
 #include <chrono>
@@ -13,6 +14,7 @@
 
 #include "server/capture/camera_file.hpp"
 #include "server/capture/frame_decoder.hpp"
+#include "server/capture/gap.hpp"
 #include "server/capture/image_list.hpp"
 #include "server/capture/target_file.hpp"
 #include "shared/io/log.hpp"
@@ -24,6 +26,8 @@ namespace {
 // While no file descriptor is free: how often to look, and how often to say so.
 constexpr std::chrono::milliseconds kLookAgain(200);
 constexpr Timestamp kSayAgain_ns = 5'000'000'000;
+constexpr Timestamp kLongestPause_ns = 5'000'000'000;  // in real time: nobody waits for an hour
+constexpr int kPausesTold = 3;
 
 class DatasetSource : public FrameSource {
  public:
@@ -121,7 +125,15 @@ class EveryFrameSource final : public DatasetSource {
 /// Delivers frames when they are due, as the camera would have.
 class RealtimeSource final : public DatasetSource {
  public:
-  using DatasetSource::DatasetSource;
+  RealtimeSource(SourceInfo info, FrameDecoder decoder, std::uint64_t first, std::uint64_t end)
+      : DatasetSource(std::move(info), std::move(decoder), first, end), first_(first) {
+    Timestamp before_ns = decoder_.entries()[first].time_ns, at_ns = before_ns;
+    for (std::uint64_t index = first; index < end; ++index) {
+      const Timestamp time_ns = decoder_.entries()[index].time_ns;
+      at_ns += std::min(time_ns - std::exchange(before_ns, time_ns), kLongestPause_ns);
+      times_ns_.push_back(at_ns);
+    }
+  }
 
   absl::StatusOr<std::optional<Frame>> Next() override {
     if (!started_) {
@@ -150,7 +162,7 @@ class RealtimeSource final : public DatasetSource {
   }
 
  private:
-  Timestamp TimeOf(std::uint64_t index) const { return decoder_.entries()[index].time_ns; }
+  Timestamp TimeOf(std::uint64_t index) const { return times_ns_[index - first_]; }
   Timestamp DueAt(std::uint64_t index) const { return origin_ns_ + TimeOf(index); }
 
   bool Stopped() {
@@ -165,6 +177,8 @@ class RealtimeSource final : public DatasetSource {
     return !stopped_;
   }
 
+  const std::uint64_t first_;
+  std::vector<Timestamp> times_ns_;  // by the recording's clock, without the rest of long pauses
   bool started_ = false;
   Timestamp origin_ns_ = 0;  // steady clock minus capture clock
 };
@@ -198,6 +212,23 @@ absl::Status ReadFacts(const std::filesystem::path& folder, std::uint64_t first_
     if (first_frame == 0) info->start = *start;
   }
   return absl::OkStatus();
+}
+
+/// Where the recording pauses, and what that means, on stderr.
+void TellPauses(const std::filesystem::path& list, const std::vector<ImageEntry>& entries,
+                std::uint64_t first, std::uint64_t end) {
+  int pauses = 0;
+  for (std::uint64_t i = first + 1; i < end; ++i) {
+    if (!IsGap(entries[i - 1].time_ns, entries[i].time_ns) || ++pauses > kPausesTold) continue;
+    Log(absl::StrFormat(
+        "%s:%d: a pause of %.6g s (time stamps are seconds) before frame %d: "
+        "tracking starts anew there",
+        list.string(), entries[i].line, Seconds(entries[i].time_ns - entries[i - 1].time_ns), i));
+  }
+  if (pauses > kPausesTold) {
+    Log(absl::StrCat(list.string(), ": ", pauses - kPausesTold, " more pauses of above ",
+                     Seconds(kLongestGap_ns), " s"));
+  }
 }
 
 /// A wrong size in camera.yaml is told at once, by the first picture that can be read at all.
@@ -238,6 +269,7 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenDataset(const std::filesystem::
   if (const absl::Status status = ReadFacts(folder, options.first_frame, &info); !status.ok()) {
     return status;
   }
+  TellPauses(folder / "rgb.txt", *entries, options.first_frame, end);
   FrameDecoder decoder(folder, *std::move(entries), info.camera);
   if (const absl::Status status = CheckFirstPicture(decoder, options.first_frame, end);
       !status.ok()) {

@@ -14,8 +14,9 @@ namespace saccade {
 /// out; its capture time is its time stamp.
 ///
 /// Without `realtime` every frame is delivered in order, decoded ahead on a thread of its own. With
-/// it, frame k is due (its stamp - the first's) after the first Next(); a reader who comes late
-/// gets the newest frame that is due.
+/// it, frame k is due (its stamp - the first's) after the first Next(), pauses of more than five
+/// seconds counted as five; a reader who comes late gets the newest frame that is due. Where two
+/// stamps are more than a second apart, a line on stderr says so.
 ///
 /// start.yaml and a chessboard's hint speak of frame 0 and are left out if `first_frame` is later.
 ///   NotFound         no folder, no rgb.txt, no camera.yaml, no template

@@ -60,7 +60,9 @@ GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> sourc
   AnchorOptions anchor_options;
   if (source_->info().target) anchor_options.world_key = WorldKey(*source_->info().target);
   anchors_ = std::make_unique<AnchorManager>(
-      anchor_options, [ring = ring_.get()](FrameId id) { return ring->Find(id); }, session_.seed);
+      anchor_options,
+      [ring = ring_.get()](FrameId id) { return ring->Find(id, FrameRing::Want::kGrey); },
+      session_.seed);
   mount_->AdvanceTo(0);
   looks_file_.Write(
       "time_s,annotation,arrived_after_s,true_error_deg,believed_error_deg,anchor_off_across_cm,"

@@ -121,7 +121,20 @@ void AddRecord(CLI::App& app, RenderArguments& arguments) {
   record->add_option("--out", arguments.out, "Folder in TUM layout to write")->required();
 }
 
+/// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell
+/// starts what is in the background deaf to SIGINT, and a mask of blocked signals is inherited.
+void HearSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int number : {SIGINT, SIGTERM}) {
+    sigaddset(&signals, number);
+    signal(number, SIG_DFL);
+  }
+  sigprocmask(SIG_UNBLOCK, &signals, nullptr);
+}
+
 int Main(int argc, char** argv) {
+  HearSignals();
   cv::setNumThreads(1);  // results must not depend on the machine's cores
   CLI::App app("Saccade's evaluation: runs on recordings, scores, simulation", "saccade-eval");
   app.set_version_flag("--version", "saccade-eval " SACCADE_VERSION);
@@ -143,7 +156,6 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
   }
-  signal(SIGINT, SIG_DFL);  // a shell starts what is in the background deaf to it
   absl::Status status;
   if (app.got_subcommand("run")) status = RunCommand(run);
   if (app.got_subcommand("score")) status = ScoreCommand(score);

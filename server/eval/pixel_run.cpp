@@ -95,7 +95,9 @@ PixelRun::PixelRun(std::unique_ptr<SimSource> source, TrackerSession session, Ru
   AnchorOptions anchor_options;
   if (source_->info().target) anchor_options.world_key = WorldKey(*source_->info().target);
   anchors_ = std::make_unique<AnchorManager>(
-      anchor_options, [ring = ring_.get()](FrameId id) { return ring->Find(id); }, session_.seed);
+      anchor_options,
+      [ring = ring_.get()](FrameId id) { return ring->Find(id, FrameRing::Want::kGrey); },
+      session_.seed);
   truth_file_.Write("# timestamp tx ty tz qx qy qz qw   (camera in world, metres)\n");
   anchors_file_.Write(
       "frame,anchor,state,drawn,true_u_px,true_v_px,error_px,error_mm_per_m,error_m,reported_error_"

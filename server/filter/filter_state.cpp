@@ -111,7 +111,9 @@ void FilterState::Predict(double dt, const MotionNoise& noise, const HeadMotion*
     head_.reset();
   }
   constexpr double kLongestStep_s = 1.0 / 30.0;
-  const int steps = std::max(1, static_cast<int>(std::ceil(dt / kLongestStep_s - 0.1)));
+  constexpr double kMostSteps = 30.0;  // a second; whoever asks for more knows nothing anyway
+  const auto steps =
+      static_cast<int>(std::clamp(std::ceil(dt / kLongestStep_s - 0.1), 1.0, kMostSteps));
   const double step = dt / steps;
   for (int k = 0; k < steps; ++k) {
     const MotionJacobians jacobians = LineariseMotion(

@@ -149,7 +149,8 @@ class FilterState {
   AnchoredPoint Point(FeatureId id) const;
   FeatureMarginal Marginal(FeatureId id) const;
 
-  /// Carries the camera `dt` seconds on, in steps of at most 1/30 s. `head`: what its joints did in
+  /// Carries the camera `dt` seconds on, in steps of at most 1/30 s up to a second, and in 30 steps
+  /// beyond: the cost does not grow with a gap. `head`: what its joints did in
   /// these `dt` seconds, if that is known; then camera()'s velocities are the wearer's alone
   /// (README: head). Velocities given to Reset() and ResetCamera() are the wearer's wherever the
   /// head is known.

@@ -13,7 +13,10 @@ constexpr double kLongest = 3.0;         // ...in so many windows
 }  // namespace
 
 void WearerPredictor::Add(Timestamp time_ns, const Rigid3& world_from_mount) {
-  if (!poses_.empty() && time_ns <= poses_.back().time_ns) return;
+  if (!poses_.empty() && time_ns <= poses_.back().time_ns) {
+    if (Seconds(poses_.back().time_ns - time_ns) <= kLongest * window_s_) return;
+    poses_.clear();  // the clock was set back
+  }
   poses_.push_back({time_ns, world_from_mount});
   // After a gap (a fast saccade) what was before it says more of the rate than two poses since.
   while (Seconds(time_ns - poses_.front().time_ns) > window_s_ &&

@@ -62,6 +62,19 @@ void Tracker::Impl::Recover(const Frame& frame) {
   monitor_.BeginRelocalisation();
 }
 
+void Tracker::Impl::ResumeAfterGap() {
+  has_frame_ = false;  // encoders and rates of the frame before say nothing of this one
+  head_rate_rad_s_ = 0.0;
+  if (!started_) return;
+  Revert();
+  if (monitor_.status() == TrackingStatus::kInitialising || relocaliser_.size() == 0) {
+    Reset();
+    return;
+  }
+  monitor_.Lose();
+  frames_lost_ = 0;  // the next frame is asked at once
+}
+
 bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camera) {
   const double unit = 1.0 / std::max(1e-6, depth_.inverse_range);
   Vector12d sigma;

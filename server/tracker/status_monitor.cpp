@@ -34,6 +34,14 @@ double StatusMonitor::ratio() const {
   return attempted == 0 ? 1.0 : static_cast<double>(accepted) / attempted;
 }
 
+void StatusMonitor::Lose() {
+  status_ = TrackingStatus::kLost;
+  quality_ = TrackingQuality::kBad;
+  bad_in_row_ = blind_in_row_ = doubtful_in_row_ = unconvinced_ = 0;
+  refused_ = false;
+  window_.clear();
+}
+
 void StatusMonitor::BeginRelocalisation() {
   status_ = TrackingStatus::kRelocalising;
   confirming_ = kConfirmations;
@@ -99,10 +107,7 @@ void StatusMonitor::Count(int attempted, int accepted, bool settled) {
   blind_in_row_ = accepted == 0 ? blind_in_row_ + 1 : 0;
   if (bad_in_row_ >= options_.lost_after_bad || blind_in_row_ >= options_.lost_after_blind ||
       doubtful_in_row_ >= kLongestDoubt) {
-    status_ = TrackingStatus::kLost;
-    quality_ = TrackingQuality::kBad;
-    bad_in_row_ = blind_in_row_ = doubtful_in_row_ = unconvinced_ = 0;
-    window_.clear();
+    Lose();
   } else if (accepted < options_.coasting_below || !believed) {
     status_ = TrackingStatus::kCoasting;
   } else {

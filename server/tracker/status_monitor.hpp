@@ -23,6 +23,8 @@ class StatusMonitor {
   /// A frame that was not searched, because the head turns too fast for it to show anything: its
   /// encoders carry the pose. It counts neither for nor against; after 2 s of these, as blind.
   void Suspend();
+  /// Nobody knows where the camera is: a gap in time, say.
+  void Lose();
   /// Tracking was lost, and now the camera may be found again: three frames must confirm it.
   void BeginRelocalisation();
 

@@ -27,7 +27,9 @@ class Tracker {
   Tracker& operator=(const Tracker&) = delete;
 
   /// Never null. Frames come in the order of their capture times; one that is not newer than the
-  /// last, or not of the camera's size, changes nothing but the snapshot's frame id.
+  /// last, or not of the camera's size, changes nothing but the snapshot's frame id. After a gap of
+  /// more than a second, or where the clock was set back by more, tracking starts anew: in the map,
+  /// if it recognises it. The cost of a frame does not depend on the gap.
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame);
 
   /// Returns when nothing is being computed on other threads (for a process that forks).

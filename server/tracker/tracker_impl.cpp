@@ -1,5 +1,6 @@
 #include "server/tracker/tracker_impl.hpp"
 
+#include "server/capture/gap.hpp"
 #include "server/pipeline/stop_watch.hpp"
 #include "server/tracker/encoder_motion.hpp"
 #include "server/tracker/recovery.hpp"
@@ -84,9 +85,11 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   const bool usable = frame.camera != nullptr && frame.grey.cols == source_.camera->width() &&
                       frame.grey.rows == source_.camera->height();
   const double dt = has_frame_ ? Seconds(frame.capture_time_ns - last_frame_.capture_time_ns) : 0.0;
-  if (!usable || (has_frame_ && dt <= 0.0) || !pyramid_.Build(frame.grey).ok()) {
+  const bool gap = has_frame_ && IsGap(last_frame_.capture_time_ns, frame.capture_time_ns);
+  if (!usable || (has_frame_ && dt <= 0.0 && !gap) || !pyramid_.Build(frame.grey).ok()) {
     return Publish(frame, times_);
   }
+  if (gap) ResumeAfterGap();
   previous_mount_ = has_frame_ ? last_frame_.mount : std::nullopt;
   last_frame_ = frame;
   if (last_frame_.mount && !ToVector(*last_frame_.mount).allFinite()) last_frame_.mount.reset();

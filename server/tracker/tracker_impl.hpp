@@ -37,6 +37,9 @@ class Tracker::Impl {
   void StartAnew(const Frame& frame);
   void Follow(const Frame& frame, double dt);
   void Recover(const Frame& frame);
+  /// Before the first frame after a gap in time (server/capture/gap.hpp): a map that can be
+  /// recognised is looked for in that frame, and confirmed as after any loss; another starts anew.
+  void ResumeAfterGap();
   bool Accept(const Relocalisation& found, const CameraModel& camera);
   void Revert();
   /// Predicts and searches; widens what is expected if the camera moved unexpectedly.

@@ -1,9 +1,11 @@
 // SIGINT ends `saccade` and `saccade-eval` within two seconds, a second one at once.
+#include <absl/strings/str_format.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
 #include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <thread>
 
 #include "tests/integration/support/process.hpp"
@@ -85,6 +87,30 @@ TEST_F(Interrupt, EvalRunAndSim) {
   std::this_thread::sleep_for(milliseconds(60));
   const std::optional<int> done = run.Wait(milliseconds(0));
   if (!done) ExpectEnds(run, 2.0, kEnded);
+}
+
+/// Started as by a shell in the background or a supervisor that blocks signals, on stamps with
+/// gaps.
+TEST_F(Interrupt, EvalRunOnGapsInTimeAlsoWhereSignalsWereBlockedAndIgnored) {
+  std::ofstream list(folder_ / "set/rgb.txt");
+  for (int i = 0; i < 90; ++i) {  // every third picture comes a day later
+    list << 86'400 * (i / 3) << "." << 100 * (i % 3)
+         << absl::StrFormat(" rgb/%.6f.png\n", i / 30.0);
+  }
+  list.close();
+  Process plain(
+      {SACCADE_EVAL_PROGRAM, "run", "--dataset", folder_ / "set", "--out", folder_ / "plain"});
+  EXPECT_EQ(plain.Wait(std::chrono::seconds(60)), 0) << plain.err();  // before: bad_alloc, or hours
+  sigset_t blocked, old;
+  sigemptyset(&blocked);
+  for (const int number : {SIGINT, SIGTERM}) sigaddset(&blocked, number);
+  pthread_sigmask(SIG_BLOCK, &blocked, &old);
+  signal(SIGINT, SIG_IGN);
+  Process sim({SACCADE_EVAL_PROGRAM, "sim", "--scenario", "desk", "--out", folder_ / "sim"});
+  signal(SIGINT, SIG_DFL);
+  pthread_sigmask(SIG_SETMASK, &old, nullptr);
+  std::this_thread::sleep_for(milliseconds(1500));
+  ExpectEnds(sim, 2.0, kEnded);
 }
 
 TEST_F(Interrupt, NumbersThatAreNoneAreRefused) {

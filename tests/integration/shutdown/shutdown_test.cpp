@@ -1,5 +1,6 @@
 // A signal ends saccade-server within two seconds, with exit code 0 and everything kept, whatever
 // it is doing.
+#include <absl/strings/str_format.h>
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -120,6 +121,25 @@ TEST_F(ShutdownTest, WhileTheNextFrameIsNotDueForLong) {
     EXPECT_LT(End(server.process(), signal), 2.0);
     EXPECT_EQ(server.process().err().find("left"), std::string::npos)
         << "in order: " << server.process().err();
+  }
+}
+
+TEST_F(ShutdownTest, OnStampsThatAreAYearApart) {
+  std::ofstream list(folder_ / "set/rgb.txt");
+  for (int i = 0; i < 60; ++i) {  // every tenth picture: nothing grows with the gap
+    list << 31'536'000LL * (i / 10) << ".0" << i % 10
+         << absl::StrFormat(" rgb/%.6f.png\n", i / 30.0);
+  }
+  list.close();
+  for (const bool every_frame : {true, false}) {
+    std::vector<std::string> arguments = Arguments();
+    if (every_frame) arguments.insert(arguments.end(), {"--speed", "max"});
+    Server server(arguments);
+    std::this_thread::sleep_for(milliseconds(600));
+    EXPECT_LT(End(server.process(), SIGINT), 2.0);
+    EXPECT_EQ(server.process().err().find("left without"), std::string::npos)
+        << "in order: " << server.process().err();
+    EXPECT_THAT(server.process().err(), HasSubstr("rgb.txt:11: a pause of 3.1536e+07 s"));
   }
 }
 

@@ -200,51 +200,5 @@ TEST(Click, RayFromTheMapViewMeetsTheSurface) {
   EXPECT_NEAR(edit->annotation.anchor.point_in_world.z(), 2.5, 0.05);  // the back wall
 }
 
-/// A frame a second, 100x100 in colour.
-void PushFrames(FrameId first, FrameId end, FrameRing& ring) {
-  for (FrameId id = first; id < end; ++id) {
-    auto frame = std::make_shared<Frame>();
-    frame->id = id;
-    frame->capture_time_ns = static_cast<Timestamp>(id) * 1'000'000'000;
-    frame->grey = cv::Mat(100, 100, CV_8UC1);
-    frame->color = cv::Mat(100, 100, CV_8UC3);
-    ring.Push({frame, std::make_shared<MapSnapshot>()});
-  }
-}
-
-TEST(FrameRing, HoldsWhatWasFetchedUntilTheSourceStartsAgain) {
-  FrameRing::Options options;
-  options.max_held = 2;
-  FrameRing ring(options);
-  PushFrames(0, 6, ring);
-  for (const FrameId id : {1u, 2u, 3u, 2u}) ring.Hold(*ring.Find(id));
-  PushFrames(6, 40, ring);
-  EXPECT_FALSE(ring.Find(1).ok());
-  EXPECT_FALSE(ring.Find(4).ok());
-  ASSERT_TRUE(ring.Find(2).ok());
-  EXPECT_EQ(ring.Find(2)->frame->id, 2u);
-  EXPECT_FALSE(ring.Find(2)->frame->color.empty());
-  ASSERT_TRUE(ring.Find(3).ok());
-  PushFrames(0, 1, ring);
-  EXPECT_FALSE(ring.Find(2).ok());
-}
-
-TEST(FrameRing, KeepsTenSecondsAndDropsColourFirst) {
-  FrameRing::Options options;
-  options.max_bytes = 100 * 100 * 4 * 3;
-  FrameRing ring(options);
-  PushFrames(0, 8, ring);
-  ASSERT_TRUE(ring.Find(7).ok());
-  EXPECT_FALSE(ring.Find(7)->frame->color.empty());
-  ASSERT_TRUE(ring.Find(3).ok());
-  EXPECT_TRUE(ring.Find(3)->frame->color.empty());
-  EXPECT_FALSE(ring.Find(3)->frame->grey.empty());
-  auto restarted = std::make_shared<Frame>();
-  restarted->grey = cv::Mat(100, 100, CV_8UC1);
-  ring.Push({restarted, std::make_shared<MapSnapshot>()});
-  EXPECT_FALSE(ring.Find(7).ok());
-  EXPECT_EQ(ring.Newest()->frame->id, 0u);
-}
-
 }  // namespace
 }  // namespace saccade

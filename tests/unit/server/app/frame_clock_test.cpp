@@ -30,6 +30,24 @@ TEST(FrameClock, ARecordingThatStoodStillIsNotLateForEver) {
   EXPECT_EQ(clock.ToMonotonic(recorded + 66 * kMs, 30'170 * kMs), 30'166 * kMs);
 }
 
+TEST(FrameClock, ALiveClockThatIsSetStaysNearArrival) {
+  constexpr Timestamp kHour = 3'600'000 * kMs;
+  for (const Timestamp by : {-kHour, kHour}) {
+    FrameClock clock;
+    const Timestamp now = 5 * kHour;
+    EXPECT_EQ(clock.ToMonotonic(now, now + 9 * kMs), now);
+    EXPECT_EQ(clock.ToMonotonic(now + 33 * kMs + by, now + 42 * kMs), now + 42 * kMs);
+    EXPECT_EQ(clock.ToMonotonic(now + 66 * kMs + by, now + 75 * kMs), now + 75 * kMs);
+  }
+}
+
+TEST(FrameClock, ARecordingWithAPauseThatWasCutShortStaysNearArrival) {
+  FrameClock clock;
+  EXPECT_EQ(clock.ToMonotonic(0, 100'000 * kMs), 100'000 * kMs);
+  EXPECT_EQ(clock.ToMonotonic(3'600'000 * kMs, 105'000 * kMs), 105'000 * kMs);
+  EXPECT_EQ(clock.ToMonotonic(3'600'033 * kMs, 105'033 * kMs), 105'033 * kMs);
+}
+
 TEST(FrameClock, WithoutPaceAFrameIsCapturedWhenItArrives) {
   FrameClock clock(/*paced=*/false);
   EXPECT_EQ(clock.ToMonotonic(33 * kMs, 9'000 * kMs), 9'000 * kMs);

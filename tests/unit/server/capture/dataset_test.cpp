@@ -174,6 +174,25 @@ TEST_F(Dataset, RealtimeGivesALateReaderTheNewest) {
   EXPECT_EQ(source->bad_frames(), 0);
 }
 
+TEST_F(Dataset, APauseIsToldWithItsLineAndNobodyWaitsForAnHour) {
+  Write("rgb.txt", "# head\n0 rgb/0.png\n0.01 rgb/1.jpg\n3600.02 rgb/2.png\n3600.03 rgb/3.jpg\n");
+  SourceOptions options;
+  options.realtime = true;
+  testing::internal::CaptureStderr();
+  auto source = Open(options);
+  FlushLog(std::chrono::seconds(2));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              AllOf(HasSubstr("rgb.txt:4: a pause of 3600.01 s"), HasSubstr("frame 2"),
+                    HasSubstr("tracking starts anew")));
+  const Timestamp begin = MonotonicNow();
+  auto frame = source->Next();
+  for (int i = 0; i < 2; ++i) frame = source->Next();
+  EXPECT_EQ((*frame)->id, 2);
+  EXPECT_EQ((*frame)->capture_time_ns, 3'600'020'000'000) << "the stamp is the recording's own";
+  EXPECT_GT(Seconds(MonotonicNow() - begin), 4.9);
+  EXPECT_LT(Seconds(MonotonicNow() - begin), 8.0);
+}
+
 TEST_F(Dataset, StopEndsAWaitingReader) {
   Write("rgb.txt", "0 rgb/0.png\n3600 rgb/1.jpg\n");
   SourceOptions options;

@@ -1,3 +1,4 @@
+#include <absl/strings/str_format.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
@@ -179,6 +180,44 @@ TEST_F(Parsers, ImageListErrorsNameTheLine) {
   std::filesystem::remove(folder_ / "rgb.txt");
   EXPECT_THAT(LoadImageList(folder_ / "rgb.txt").status().message(),
               AllOf(HasSubstr("rgb.txt: cannot be opened"), HasSubstr("SECONDS FILE")));
+}
+
+TEST_F(Parsers, TimeStampsInAnotherUnitAreRefusedByFileLineUnitAndRemedy) {
+  const auto list = [](double first, double step, int decimals) {
+    std::string text = "# timestamp filename\n";
+    for (int i = 0; i < 300; ++i) {
+      text += absl::StrFormat("%.*f", decimals, first + i * step) + " a.png\n";
+    }
+    return text;
+  };
+  const struct {
+    const char* unit;
+    double per_second;
+    const char* remedy;
+  } kUnits[] = {{"milliseconds", 1e3, "divide by 1000"},
+                {"microseconds", 1e6, "divide by 1000000"},
+                {"nanoseconds", 1e9, "divide by 1000000000"}};
+  for (const auto& unit : kUnits) {
+    // Since 1970, as cameras and ROS write them: no date in seconds.
+    EXPECT_THAT(ListError(list(1305031102.2 * unit.per_second, unit.per_second / 30, 0)),
+                AllOf(HasSubstr("rgb.txt:2: "), HasSubstr(unit.unit), HasSubstr(unit.remedy)));
+    // Since the recording began, at several rates.
+    for (const double fps : {5.0, 30.0, 120.0}) {
+      EXPECT_THAT(ListError(list(0, unit.per_second / fps, 0)),
+                  AllOf(HasSubstr("rgb.txt:3: time stamps are in seconds"), HasSubstr(unit.unit),
+                        HasSubstr(unit.remedy)))
+          << fps;
+    }
+  }
+  // A picture a second, or one long pause, is slow and no other unit.
+  Write("rgb.txt", list(0, 1.0, 3));
+  EXPECT_TRUE(LoadImageList(folder_ / "rgb.txt").ok());
+  Write("rgb.txt", "0 a.png\n0.03 b.png\n3600 c.png\n3600.03 d.png\n3600.06 e.png\n");
+  EXPECT_TRUE(LoadImageList(folder_ / "rgb.txt").ok());
+  Write("rgb.txt", "0 a.png\n3600 b.png\n");
+  EXPECT_TRUE(LoadImageList(folder_ / "rgb.txt").ok());
+  EXPECT_THAT(ListError("7200.0 a.png\n3600.0 b.png\n"),
+              AllOf(HasSubstr("rgb.txt:2:"), HasSubstr("if the clock was set back here")));
 }
 
 TEST_F(Parsers, ImageListTakesWindowsFilesAndNamesWithSpaces) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <ctime>
 #include <map>
 
 #include "server/filter/robust_pose.hpp"
@@ -414,6 +415,31 @@ TEST(FilterState, BadInputIsRefusedAndChangesNothing) {
   EXPECT_EQ(sim.filter_.FullCovariance(), before);
   sim.filter_.Remove(std::vector<FeatureId>{99});
   EXPECT_EQ(sim.filter_.feature_count(), 5U);
+}
+
+TEST(FilterState, PredictingOverADayCostsWhatASecondCosts) {
+  RandomWorld world(3);
+  FilterState filter{FilterOptions()};
+  filter.Reset(CameraMotion(), SmallCovariance(0, 0, 0.3, 0.5));
+  const AnchorPoseId anchor = filter.AddAnchor();
+  for (FeatureId id = 1; id <= 100; ++id) {
+    FeatureBirth birth;
+    birth.id = id;
+    birth.bearing =
+        Eigen::Vector3d(world.Uniform(-0.5, 0.5), world.Uniform(-0.4, 0.4), 1).normalized();
+    birth.inverse_range = 0.5;
+    birth.inverse_range_sigma = 0.25;
+    ASSERT_TRUE(filter.AddFeature(anchor, birth).ok());
+  }
+  const auto cpu_ms = [&](double dt) {
+    const std::clock_t begin = std::clock();
+    filter.Predict(dt, MotionNoise());
+    return 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  };
+  const double second_ms = cpu_ms(1.0), day_ms = cpu_ms(86'400.0), year_ms = cpu_ms(3e7);
+  std::printf("a second %.2f ms, a day %.2f ms, a year %.2f ms\n", second_ms, day_ms, year_ms);
+  EXPECT_LT(day_ms, 3 * second_ms + 5.0);
+  EXPECT_LT(year_ms, 3 * second_ms + 5.0);
 }
 
 }  // namespace

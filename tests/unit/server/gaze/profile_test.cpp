@@ -61,6 +61,19 @@ TEST(WearerPredictor, CarriesAConstantMotionOnExactly) {
   EXPECT_LT(RotationAngle(*ahead, truth), 1e-6);
 }
 
+TEST(WearerPredictor, GoesOnAfterTheClockWasSetBack) {
+  WearerPredictor predictor(0.25);
+  for (const Timestamp start_ns : {Timestamp{7'200'000'000'000}, Timestamp{3'600'000'000'000}}) {
+    for (int i = 0; i < 10; ++i) {
+      Rigid3 pose;
+      pose.translation.x() = Seconds(start_ns) + 0.1 * i;
+      predictor.Add(start_ns + i * Timestamp{33'333'333}, pose);
+    }
+    EXPECT_NEAR(predictor.Newest()->translation.x(), Seconds(start_ns) + 0.9, 1e-9);
+    EXPECT_EQ(predictor.newest_ns(), start_ns + 9 * Timestamp{33'333'333});
+  }
+}
+
 TEST(WearerPredictor, FollowsAHalfHertzSwayAheadOfTime) {
   WearerPredictor predictor(0.25);
   const auto angle_at = [](double t) { return 0.105 * std::sin(3.14159 * t); };

@@ -1,6 +1,7 @@
 // The tracker on a recording whose lens is covered, or whose view jumps.
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -44,9 +45,11 @@ class Player {
   }
   Snapshot Show(Frame frame) {
     frame.id = next_;
-    frame.capture_time_ns = 1'000'000'000 + static_cast<Timestamp>(next_++) * 33'333'333;
+    frame.capture_time_ns = start_ns_ + static_cast<Timestamp>(next_++) * 33'333'333;
     return tracker_->Track(frame);
   }
+  /// From now on the clock is `by_ns` ahead of what it would have been.
+  void SetClock(Timestamp by_ns) { start_ns_ += by_ns; }
   Tracker& tracker() { return *tracker_; }
 
  private:
@@ -54,6 +57,7 @@ class Player {
   std::vector<Frame> frames_;
   std::unique_ptr<Tracker> tracker_;
   std::uint64_t next_ = 0;
+  Timestamp start_ns_ = 10'000'000'000'000;
 };
 
 class Recovery : public testing::Test {
@@ -104,6 +108,40 @@ TEST_F(Recovery, AfterTheLensWasCovered) {
   ASSERT_EQ(last->status, TrackingStatus::kTracking);
   EXPECT_GE(last->features.size() + 5, known);  // the map was frozen, not thrown away
   EXPECT_LT((last->world_from_camera.translation - poses_[294].translation).norm(), 0.04);
+}
+
+/// Pause of an hour, of a year (nanoseconds taken for seconds), clock set back by an hour.
+TEST_F(Recovery, AGapInTimeOfWhateverLengthIsANewStartInTheMapAtTheCostOfAFrame) {
+  constexpr Timestamp kHour_ns = 3'600'000'000'000;
+  std::size_t frame = 275;
+  for (const Timestamp by_ns : {kHour_ns, 8760 * kHour_ns, -kHour_ns}) {
+    player_->SetClock(by_ns);
+    Snapshot last;
+    std::size_t k = 0;
+    for (; k < 20 && (last == nullptr || last->status != TrackingStatus::kTracking); ++k) {
+      const std::clock_t begin = std::clock();
+      last = player_->Show(frame + k);
+      const double cpu_ms = 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+      EXPECT_LT(cpu_ms, 300.0) << by_ns;  // a relocalisation; before, 1400 and more
+      ASSERT_TRUE(last->world_from_camera.translation.allFinite());
+    }
+    EXPECT_GT(k, 3) << "not tracked before three frames confirm it";
+    ASSERT_EQ(last->status, TrackingStatus::kTracking) << by_ns;
+    EXPECT_EQ(last->map_generation, 0) << "the same map";
+    const Rigid3& then = poses_[frame + k - 1];
+    EXPECT_LT((last->world_from_camera.translation - then.translation).norm(), 0.04);
+    frame -= 40;
+  }
+}
+
+TEST_F(Recovery, AGapBeforeThereIsAMapStartsAnother) {
+  player_->tracker().Reset();
+  const Snapshot before = player_->Show(100);
+  player_->SetClock(3'600'000'000'000);
+  Snapshot last = player_->Show(101);
+  EXPECT_EQ(last->map_generation, before->map_generation + 1);
+  for (std::size_t k = 102; k < 140; ++k) last = player_->Show(k);
+  EXPECT_EQ(last->status, TrackingStatus::kTracking);
 }
 
 TEST_F(Recovery, ShortCoverIsCoastedThrough) {
