@@ -125,7 +125,9 @@ std::optional<MapCorrection> LoopCloser::Step(const LoopView& view) {
 
 void LoopCloser::StartQuery(const LoopView& view) {
   std::unordered_map<FeatureId, Eigen::Vector3d> points;
+  last_met_.clear();
   for (const auto& [dormant, known] : view.old) {
+    last_met_[dormant->landmark.id] = dormant->landmark.last_matched_frame;
     points[dormant->landmark.id] = known.PointInWorld();
   }
   started_ = view.frame_number;
@@ -142,13 +144,11 @@ void LoopCloser::StartQuery(const LoopView& view) {
   });
 }
 
-bool LoopCloser::Plausible(const Relocalisation& found, const LoopView& view) const {
+bool LoopCloser::Plausible(const Relocalisation& found) const {
   std::vector<std::int64_t> left;  // frame in which each was last met
-  for (const auto& [dormant, known] : view.old) {
-    for (const Correspondence& inlier : found.inliers) {
-      if (inlier.id != dormant->landmark.id) continue;
-      left.push_back(dormant->landmark.last_matched_frame);
-    }
+  for (const Correspondence& inlier : found.inliers) {
+    const auto met = last_met_.find(inlier.id);
+    if (met != last_met_.end()) left.push_back(met->second);
   }
   if (left.empty()) return false;
   const auto middle = left.begin() + std::ssize(left) / 2;
@@ -166,7 +166,7 @@ void LoopCloser::TakeQuery(const LoopView& view) {
   const std::optional<Relocalisation> found = query_.get();
   waited_ms_ = watch.Lap_ms();
   if (!found || Displacement(*found, query_pose_, *view.frame.camera) < kMissed_px ||
-      !Plausible(*found, view)) {
+      !Plausible(*found)) {
     return;
   }
   candidate_.emplace();

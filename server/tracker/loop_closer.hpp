@@ -68,7 +68,7 @@ class LoopCloser {
   void StartSolving(const LoopView& view, const LoopAgreement& agreement);
   bool Due(std::int64_t frame_number) const;
   /// Whether the tracker can have drifted so far on the way since it left the old place.
-  bool Plausible(const Relocalisation& found, const LoopView& view) const;
+  bool Plausible(const Relocalisation& found) const;
   void BookWay(const LoopView& view);
 
   TrackerOptions options_;
@@ -77,8 +77,9 @@ class LoopCloser {
   std::future<std::optional<Relocalisation>> query_;
   std::future<std::optional<MapCorrection>> solving_;
   std::optional<Candidate> candidate_;
-  Rigid3 query_pose_;         // the filter's, of the queried picture
-  std::int64_t started_ = 0;  // frame of the query or the solving
+  std::unordered_map<FeatureId, std::int64_t> last_met_;  // frames, of what was asked for
+  Rigid3 query_pose_;                                     // the filter's, of the queried picture
+  std::int64_t started_ = 0;                              // frame of the query or the solving
   std::int64_t pause_until_ = 0;
   double waited_ms_ = 0.0;
   std::optional<Rigid3> last_pose_;
