@@ -42,6 +42,11 @@ struct RenderArguments {
   std::string source, frames;  // sim:desk?..., A:B
   std::filesystem::path out;
 };
+struct PoseGraphArguments {
+  std::filesystem::path in, out;
+  std::string cost = "chordal";  // or chi2
+  double robust_width = 0;       // [sigmas], 0: none
+};
 
 /// The subcommands of saccade-eval (architecture section 4). Results go to stdout, errors come
 /// back.
@@ -53,6 +58,8 @@ absl::Status RenderCommand(const RenderArguments& arguments);
 /// Writes a simulated source as a recording in TUM layout, noise and all: rgb/, rgb.txt,
 /// camera.yaml and groundtruth.txt. It names no target, so it starts as a recording of a room does.
 absl::Status RecordCommand(const RenderArguments& arguments);
+/// Optimises a pose graph in g2o's form and prints its cost before and after.
+absl::Status PoseGraphCommand(const PoseGraphArguments& arguments);
 
 /// Scenarios that SimCommand knows, for people: "points, desk, ...".
 std::string ScenarioNames();

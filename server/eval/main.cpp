@@ -133,6 +133,24 @@ void HearSignals() {
   sigprocmask(SIG_UNBLOCK, &signals, nullptr);
 }
 
+void AddPoseGraph(CLI::App& app, PoseGraphArguments& arguments) {
+  CLI::App* graph = app.add_subcommand("posegraph", "Optimise a pose graph; prints its cost");
+  graph->add_option("--in", arguments.in, "g2o file: VERTEX_SE3:QUAT, EDGE_SE3:QUAT, or SE2")
+      ->required();
+  graph->add_option("--out", arguments.out, "g2o file to write")->required();
+  graph
+      ->add_option("--cost", arguments.cost,
+                   "chordal: SE-Sync's, isotropic; chi2: full information matrices, g2o's")
+      ->check(CLI::IsMember({"chordal", "chi2"}))
+      ->capture_default_str();
+  graph
+      ->add_option("--robust", arguments.robust_width,
+                   "Width of Cauchy's loss on edges in sigmas; 0: squares")
+      ->check(CLI::Range(0.0, 1e6))
+      ->check(Finite())
+      ->capture_default_str();
+}
+
 int Main(int argc, char** argv) {
   HearSignals();
   cv::setNumThreads(1);  // results must not depend on the machine's cores
@@ -146,11 +164,13 @@ int Main(int argc, char** argv) {
   ScoreArguments score;
   SimArguments sim;
   RenderArguments render, record;
+  PoseGraphArguments graph;
   AddRun(app, run);
   AddScore(app, score);
   AddSim(app, sim);
   AddRender(app, render);
   AddRecord(app, record);
+  AddPoseGraph(app, graph);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -162,6 +182,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("sim")) status = SimCommand(sim);
   if (app.got_subcommand("render")) status = RenderCommand(render);
   if (app.got_subcommand("record")) status = RecordCommand(record);
+  if (app.got_subcommand("posegraph")) status = PoseGraphCommand(graph);
   return status.ok() ? 0 : Fail(status);
 }
 

@@ -7,6 +7,7 @@
 #include "server/eval/commands.hpp"
 #include "server/eval/forms_scenario.hpp"
 #include "server/eval/gaze_scenario.hpp"
+#include "server/eval/loop_scenario.hpp"
 #include "server/eval/pixel_run.hpp"
 #include "server/eval/points_scenario.hpp"
 #include "server/eval/reloc_scenario.hpp"
@@ -119,7 +120,7 @@ double DefaultDuration_s(absl::string_view scenario) {
 }  // namespace
 
 std::string ScenarioNames() {
-  std::string names = "points, forms, soak, passerby, reloc";
+  std::string names = "points, forms, soak, passerby, reloc, loop";
   for (const PixelScenario& each : kPixelScenarios) absl::StrAppend(&names, ", ", each.name);
   absl::StrAppend(&names, ", ", GazeScenarioNames());
   return names;
@@ -137,6 +138,7 @@ absl::Status SimCommand(const SimArguments& asked) {
   if (arguments.scenario == "soak" || arguments.scenario == "passerby") {
     report = RunSoakScenario(arguments);
   }
+  if (arguments.scenario == "loop") report = RunLoopScenario(arguments);
   if (arguments.scenario == "reloc") report = RunRelocScenario(arguments);
   if (IsGazeScenario(arguments.scenario)) report = RunGazeScenario(arguments);
   for (const PixelScenario& each : kPixelScenarios) {

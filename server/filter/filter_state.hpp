@@ -17,6 +17,7 @@
 #include "server/filter/parallax.hpp"
 #include "server/filter/point_model.hpp"
 #include "shared/camera/camera_model.hpp"
+#include "shared/geometry/similarity3.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -204,6 +205,10 @@ class FilterState {
   /// one thing seen from another. False, and nothing is done: the clone is unknown, or Jacobians
   /// are at first estimates, which learn nothing of where the world is. O(n^2).
   bool CountErrorsFrom(AnchorPoseId anchor);
+
+  /// Everything is somewhere else in a world that is turned, moved and of another scale: the same
+  /// state in other coordinates, to the last correlation (README: gauge). Ends the mark. O(n^2).
+  void MoveWorld(const Similarity3& world_from_before);
 
   /// How surely a clone's direction is known from where errors are counted [rad]; unknown: 0.
   double DirectionSigma(AnchorPoseId anchor) const;

@@ -19,6 +19,18 @@ DormantLandmark DormantLandmarks::Take(FeatureId id) {
   return std::move(landmarks_.extract(id).mapped());
 }
 
+void DormantLandmarks::Move(const std::function<Similarity3(FeatureId)>& world_from_before) {
+  for (auto& [id, dormant] : landmarks_) {
+    const Similarity3 moved = world_from_before(id);
+    const Eigen::Matrix3d turn = moved.scale * moved.rotation.toRotationMatrix();
+    dormant.covariance_in_world = turn * dormant.covariance_in_world * turn.transpose();
+    dormant.inverse_range_sigma /= moved.scale;
+    // What was looked for in vain was looked for at a wrong place.
+    dormant.failures = 0;
+    dormant.rests_until = 0;
+  }
+}
+
 void DormantLandmarks::Forget(const Lookup& lookup) {
   std::erase_if(landmarks_, [&](const auto& entry) { return !lookup(entry.first); });
 }

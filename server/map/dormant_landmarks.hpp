@@ -48,6 +48,8 @@ class DormantLandmarks {
   void Put(DormantLandmark landmark);
   /// Takes one out; it must be there.
   DormantLandmark Take(FeatureId id);
+  /// The map was moved: how well each is known goes along.
+  void Move(const std::function<Similarity3(FeatureId)>& world_from_before);
   /// Those that the graph has forgotten go.
   void Forget(const Lookup& lookup);
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/map/bundle_adjustment.hpp"
+#include "shared/geometry/similarity3.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -96,6 +97,24 @@ class KeyframeGraph {
   std::optional<Remembered> Remember(FeatureId id) const;
   /// The filter's last word on a feature that leaves it.
   void SetEstimate(FeatureId id, const GraphEstimate& estimate);
+  /// Keyframes by rising id, and how many points tie two of them: born in one, seen from the other.
+  struct Outline {
+    struct Member {
+      KeyframeId id = 0;
+      Rigid3 world_from_camera;
+      double distance_m = 1.0;   // to what was in view
+      bool sees_target = false;  // its place in the world is known
+    };
+    struct Tie {
+      int from = 0, to = 0;  // indices, rising
+      int points = 0;
+    };
+    std::vector<Member> keyframes;
+    std::vector<Tie> ties;
+  };
+  Outline MakeOutline() const;
+  /// Moves every keyframe, and lengths of what was seen first from it along with its scale.
+  void Move(const std::function<const Similarity3&(KeyframeId)>& world_from_before);
   /// Takes an adjusted job over; keyframes added meanwhile move along with the newest of the job.
   void Take(const Job& job);
 

@@ -60,15 +60,18 @@ absl::Status RelocaliserOptions::Validate() const {
 Relocaliser::Relocaliser(const RelocaliserOptions& options) : options_(options) {}
 
 std::vector<int> Relocaliser::Shortlist(const cv::Mat& thumbnail,
-                                        const std::vector<DescribedPoint>& corners) const {
+                                        const std::vector<DescribedPoint>& corners,
+                                        const Scene& scene) const {
   const int count = static_cast<int>(keyframes_.size());
-  std::vector<int> order(count);
-  for (int k = 0; k < count; ++k) order[k] = k;
-  if (count <= options_.candidates) return order;
+  std::vector<int> order;
+  for (int k = 0; k < count; ++k) {
+    if (static_cast<int>(scene[k].size()) >= kLeastFeatures) order.push_back(k);
+  }
+  if (static_cast<int>(order.size()) <= options_.candidates) return order;
   // Votes: points whose look at the middle scale some strong corner shares.
   const std::size_t voters = std::min<std::size_t>(corners.size(), kVotingCorners);
   std::vector<double> likeness(count);
-  for (int k = 0; k < count; ++k) {
+  for (const int k : order) {
     const Keyframe& keyframe = keyframes_[k];
     int votes = 0;
     for (const DescribedPoint& point : keyframe.described) {
@@ -229,9 +232,10 @@ std::optional<Relocalisation> Relocaliser::Query(const cv::Mat& grey, const Came
   const std::vector<Eigen::Vector2d> pixels = PlacesToDescribe(grey, options_.max_corners);
   if (static_cast<int>(pixels.size()) < options_.min_inliers) return std::nullopt;
   const std::vector<DescribedPoint> corners = DescribePixels(grey, pixels);
-  std::vector<int> candidates = Shortlist(Thumbnail(grey), corners);
   Scene scene;
   for (const Keyframe& keyframe : keyframes_) scene.push_back(KnownFeatures(keyframe, lookup));
+  std::vector<int> candidates = Shortlist(Thumbnail(grey), corners, scene);
+  if (candidates.empty()) return std::nullopt;
   auto found = TryCandidates(candidates, scene, camera, corners,
                              {std::max(6, 2 * options_.min_inliers / 3), options_.min_inliers});
   if (found) return found;

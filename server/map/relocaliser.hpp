@@ -16,6 +16,7 @@
 #include "server/map/picture_description.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
+#include "shared/geometry/similarity3.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -90,6 +91,9 @@ class Relocaliser {
   /// they move with their keyframe's features. False: nothing is left to do.
   bool Densify(const CameraModel& camera, const PointLookup& lookup = nullptr);
 
+  /// The map was moved: `moved` says how what lies at a feature moves; nothing if it was deleted.
+  void Move(const std::function<std::optional<Similarity3>(FeatureId)>& moved);
+
   void Clear() { keyframes_.clear(); }
   std::size_t size() const { return keyframes_.size(); }
 
@@ -123,9 +127,10 @@ class Relocaliser {
     int guided = 0;         // near where the pose predicts them
   };
 
-  /// Keyframes most like the picture, best first, at most options.candidates.
-  std::vector<int> Shortlist(const cv::Mat& thumbnail,
-                             const std::vector<DescribedPoint>& corners) const;
+  /// Keyframes most like the picture, best first, at most options.candidates; none of which too
+  /// little is known in `scene`.
+  std::vector<int> Shortlist(const cv::Mat& thumbnail, const std::vector<DescribedPoint>& corners,
+                             const Scene& scene) const;
   /// Where the keyframe was taken, by where its features are now; nothing if they disagree.
   std::optional<Rigid3> PoseNow(const Keyframe& keyframe, const CameraModel& camera,
                                 const PointLookup& lookup) const;

@@ -124,6 +124,21 @@ bool Relocaliser::Densify(const CameraModel& camera, const PointLookup& lookup) 
   return false;
 }
 
+void Relocaliser::Move(const std::function<std::optional<Similarity3>(FeatureId)>& moved) {
+  for (Keyframe& keyframe : keyframes_) {
+    std::optional<Similarity3> of_keyframe;
+    for (KeyframePoint& point : keyframe.points) {
+      const std::optional<Similarity3> by = moved(point.id);
+      if (!by) continue;
+      point.point_in_world = *by * point.point_in_world;
+      if (!of_keyframe) of_keyframe = by;
+    }
+    if (!of_keyframe) continue;
+    keyframe.world_from_camera = of_keyframe->Move(keyframe.world_from_camera);
+    for (double& range : keyframe.corners.ranges_m) range *= of_keyframe->scale;
+  }
+}
+
 void Relocaliser::ChoosePartners(Keyframe& keyframe) const {
   const double range = MedianRange(keyframe.world_from_camera, keyframe.points);
   std::vector<std::pair<double, FrameId>> others;

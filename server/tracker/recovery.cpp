@@ -22,7 +22,7 @@ constexpr double kFoundSigma_px = 1.5;
 }  // namespace
 
 void Tracker::Impl::KeepKeyframe(const Frame& frame) {
-  if (monitor_.status() != TrackingStatus::kTracking) return;
+  if (monitor_.status() != TrackingStatus::kTracking || loops_.ReadsRelocaliser()) return;
   const Rigid3& pose = filter_.camera().world_from_camera;
   const double distance = kKeyframeShare / std::max(1e-6, depth_.inverse_range);
   if (!relocaliser_.NeedsKeyframe(pose, distance, kKeyframeAngle_rad)) {

@@ -124,6 +124,13 @@ void Refiner::ForgetClones(const FilterState& filter) {
   std::erase_if(clones_, [&](const auto& entry) { return !filter.AnchorPose(entry.second); });
 }
 
+void Refiner::Move(const MapCorrection& correction, FilterState& filter) {
+  Drop(filter);
+  ForgetClones(filter);
+  graph_.Move([&](KeyframeId id) -> const Similarity3& { return correction.Of(id); });
+  filter.MoveWorld(correction.newest());
+}
+
 void Refiner::Wait() const {
   if (running_.valid()) running_.wait();
 }

@@ -8,6 +8,7 @@
 
 #include "server/filter/filter_state.hpp"
 #include "server/map/keyframe_graph.hpp"
+#include "server/map/place_graph.hpp"
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/tracker_options.hpp"
 
@@ -53,6 +54,9 @@ class Refiner {
   AnchorPoseId CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter);
   /// The filter was put back to what it was: clones since then are unknown again.
   void ForgetClones(const FilterState& filter);
+  const KeyframeGraph& graph() const { return graph_; }
+  /// Moves the keyframes, and the filter with the newest of them; a running adjustment is dropped.
+  void Move(const MapCorrection& correction, FilterState& filter);
   /// Returns when no adjustment is being computed any more.
   void Wait() const;
   /// What Finish() has waited in this frame [ms].

@@ -45,6 +45,7 @@ void Tracker::Impl::TakeOver(const FoundStart& start, const Frame& frame) {
   }
   map_.Remove(gone);
   dormant_.Clear();
+  loops_.Reset();  // it reads the relocaliser
   relocaliser_.Clear();
   refiner_.Reset();
   for (const FoundStart::Keyframe& keyframe : start.keyframes) {

@@ -50,9 +50,11 @@ Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
       monitor_(options),
       relocaliser_(MakeRelocaliserOptions(options)),
       refiner_(options),
-      finder_(options) {}
+      finder_(options),
+      loops_(options, relocaliser_) {}
 
 void Tracker::Impl::Reset() {
+  loops_.Reset();
   filter_.Reset(CameraMotion(), Matrix12d::Zero());
   map_.Clear();
   dormant_.Clear();
@@ -100,6 +102,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
     StartAnew(frame);
   } else if (monitor_.status() == TrackingStatus::kLost) {
     refiner_.Drop(filter_);
+    loops_.Reset();
     Recover(frame);
   } else {
     Follow(frame, dt);
@@ -312,6 +315,7 @@ void Tracker::Impl::Manage(const Frame& frame) {
   Remember(*frame.camera);
   refiner_.Start(frames_, filter_);
   KeepKeyframe(frame);
+  CloseLoops(frame);
 }
 
 }  // namespace saccade

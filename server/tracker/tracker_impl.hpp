@@ -6,6 +6,7 @@
 #include "server/map/dormant_landmarks.hpp"
 #include "server/map/relocaliser.hpp"
 #include "server/tracker/frame_matcher.hpp"
+#include "server/tracker/loop_closer.hpp"
 #include "server/tracker/map_keeper.hpp"
 #include "server/tracker/refiner.hpp"
 #include "server/tracker/start_finder.hpp"
@@ -25,6 +26,7 @@ class Tracker::Impl {
   void WaitForBackground() const {
     refiner_.Wait();
     finder_.Wait();
+    loops_.Wait();
   }
   absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame, const Rigid3& world_from_camera,
                                         const Eigen::Vector2d& pixel, double depth_prior_m,
@@ -68,6 +70,10 @@ class Tracker::Impl {
   std::optional<Eigen::Vector3d> PointNow(FeatureId id) const;
   /// Landmarks at rest, as the keyframes have them.
   void PublishDormant(MapSnapshot& snapshot) const;
+  OldLandmarks OldOnes() const;
+  void CloseLoops(const Frame& frame);
+  void RestTorn(const MapCorrection& correction);
+  void MoveMap(const MapCorrection& correction);
   void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
   bool Settled() const;
@@ -90,6 +96,7 @@ class Tracker::Impl {
   Relocaliser relocaliser_;
   Refiner refiner_;
   StartFinder finder_;
+  LoopCloser loops_;  // reads relocaliser_
   ImagePyramid pyramid_;
 
   Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows

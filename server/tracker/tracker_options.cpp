@@ -60,6 +60,7 @@ const Key kKeys[] = {
     {"max_features", &O::max_features, 10, 400},
     {"rest_after", &O::rest_after, 0, 1e9},
     {"wake", &O::wake, 0, 1},
+    {"loops", &O::loops, 0, 1},
     {"wake_position_share", &O::wake_position_share, 1e-4, 1},
     {"wake_angle_sigma_rad", &O::wake_angle_sigma_rad, 1e-4, 1},
     {"births_per_clone", &O::births_per_clone, 1, 100},

@@ -178,6 +178,42 @@ TEST(FilterState, CountingErrorsFromACloneKeepsWhatIsSeenFromElsewhere) {
   EXPECT_EQ((pose.translation - run.filter_.camera().world_from_camera.translation).norm(), 0.0);
 }
 
+TEST(FilterState, MovingTheWorldChangesNothingThatIsSeen) {
+  Simulation run(7, 20, FilterOptions()), other(7, 20, FilterOptions());
+  for (Simulation* each : {&run, &other}) {
+    each->BirthAll(0.5, 0.25, 0.3);
+    for (int k = 1; k < 40; ++k) each->Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.3);
+  }
+  const Similarity3 moved{1.3, ExpQuaternion({0.4, -1.0, 0.2}), {3.0, -1.0, 2.0}};
+  run.filter_.MoveWorld(moved);
+  const Rigid3 expected = moved.Move(other.filter_.camera().world_from_camera);
+  EXPECT_LT((run.filter_.camera().world_from_camera.translation - expected.translation).norm(),
+            1e-12);
+  const auto compare = [&](double tolerance) {
+    int compared = 0;
+    for (const FeatureId id : other.filter_.FeatureIds()) {
+      const auto a = run.filter_.Predicted(run.lens_, id),
+                 b = other.filter_.Predicted(run.lens_, id);
+      ASSERT_EQ(a.has_value(), b.has_value());
+      if (!a) continue;
+      ++compared;
+      EXPECT_LT((a->at.pixel - b->at.pixel).norm(), tolerance) << id;
+      EXPECT_LT((a->covariance - b->covariance).norm(), tolerance * b->covariance.norm()) << id;
+      EXPECT_LT((run.filter_.Marginal(id).point_in_world -
+                 moved * other.filter_.Marginal(id).point_in_world)
+                    .norm(),
+                tolerance);
+    }
+    EXPECT_GT(compared, 10);
+  };
+  compare(1e-9);
+  // And it goes on alike: velocities and all correlations came along.
+  for (Simulation* each : {&run, &other}) {
+    each->filter_.Predict(1.0 / 30, {0.0, 0.0});
+  }
+  compare(1e-9);
+}
+
 TEST(FilterState, APoseFromElsewhereHasAnErrorOfItsOwn) {
   Simulation run(6, 30, FilterOptions());
   run.BirthAll(0.5, 0.25, 0.3);
