@@ -59,6 +59,8 @@ class Tracker::Impl {
   std::optional<Eigen::Vector3d> PointNow(FeatureId id) const;
   /// Landmarks at rest, as the keyframes have them.
   void PublishDormant(MapSnapshot& snapshot) const;
+  /// Covariance of a fixed point in the camera frame [m^2].
+  Eigen::Matrix3d KnownInCamera(const Eigen::Vector3d& point) const;
   void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
   bool Settled() const;
