@@ -36,6 +36,7 @@ struct SimArguments {
   double duration_s = 0;  // 0: the scenario's own
   TrackerArguments tracker;
   std::vector<std::filesystem::path> foreign;  // recordings of other places, for `reloc`
+  bool targetless = false;                     // the tracker is not told of the chessboard
   bool json = false;
 };
 struct RenderArguments {

@@ -45,6 +45,7 @@ void GazeResult::Add(const GazeResult& other) {
   initialising_frames += other.initialising_frames;
   measured.Add(other.measured);
   peak_rate_deg_s = std::max(peak_rate_deg_s, other.peak_rate_deg_s);
+  claims.Add(other.claims);
 }
 
 Json GazeReportOf(const SimArguments& arguments, const GazeResult& result) {
@@ -85,6 +86,7 @@ Json GazeReportOf(const SimArguments& arguments, const GazeResult& result) {
     report["command_to_motion_ms"] = {{"p50", result.command_to_motion_ms.Percentile(50)},
                                       {"p99", result.command_to_motion_ms.Percentile(99)}};
   }
+  report["claims"] = result.claims.Report();
   return report;
 }
 

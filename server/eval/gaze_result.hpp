@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "server/eval/claims.hpp"
 #include "server/eval/commands.hpp"
 #include "server/eval/statistics.hpp"
 
@@ -20,6 +21,7 @@ struct GazeResult {
   std::uint64_t frames = 0, lost_frames = 0, initialising_frames = 0;
   Sample measured;
   double peak_rate_deg_s = 0;
+  ClaimTotals claims;
 
   void Add(const GazeResult& other);
 };

@@ -7,14 +7,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "server/eval/outline.hpp"
 #include "server/eval/registration.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kFalseDepth = 0.3;  // relative
-constexpr double kOnePixel_rad = 0.002;
 
 Timestamp Ns(double seconds) { return static_cast<Timestamp>(std::llround(1e9 * seconds)); }
 
@@ -203,6 +202,10 @@ absl::Status GazeRun::Record(const Frame& frame, const FrameCost& cost) {
   truth_file_.Write(TumLine(absl::StrFormat("%.9f", Seconds(frame.capture_time_ns)), truth));
   FrameVerdict verdict = VerdictOf(*newest_);
   const bool posed = verdict == FrameVerdict::kTracked || verdict == FrameVerdict::kCoasting;
+  claims_.Observe({Seconds(frame.capture_time_ns), posed, newest_->metric, frame.camera.get(),
+                   newest_->world_from_camera, truth},
+                  *anchors_->Latest(),
+                  [&](const Eigen::Vector3d& point) { return source_->Visible(frame.id, point); });
   if (posed && IsLost(newest_->world_from_camera, truth)) verdict = FrameVerdict::kLost;
   if (verdict != FrameVerdict::kInitialising) {
     measured_.Add(newest_->matched);
@@ -245,7 +248,10 @@ absl::StatusOr<GazeRun::Clicked> GazeRun::Click(const std::optional<Eigen::Vecto
   view.down_in_world = Eigen::Vector3d::UnitY();
   loop_->OnView(view);  // without angles: no pose before its time
   const Clicked clicked{edit->annotation.id, *point};
-  clicks_.push_back({time_s(), clicked, edit->annotation, source_->WorldFromCamera(frame)});
+  const Rigid3 eye = source_->WorldFromCamera(frame);
+  clicks_.push_back({time_s(), clicked, edit->annotation, eye});
+  claims_.Place({clicked.id, requests_, time_s(), pixel, (*point - eye.translation).norm(),
+                 IsOnOutline(*source_, eye.translation, *point), *point});
   return clicked;
 }
 
@@ -259,21 +265,6 @@ double GazeRun::TrueRoll_deg() const {
   return std::atan2(-down.x(), down.y()) / kDegree;
 }
 
-bool GazeRun::IsOnASurface(const Eigen::Vector3d& eye, const Eigen::Vector3d& point) const {
-  const double believed = (point - eye).norm();
-  const Eigen::Vector3d ray = (point - eye) / believed;
-  const Eigen::Vector3d across = ray.unitOrthogonal();
-  // And a pixel round it: a corner of an outline is where one surface ends before another.
-  for (int k = -1; k < 8; ++k) {
-    const Eigen::AngleAxisd round(std::max(k, 0) * std::numbers::pi / 4.0, ray);
-    const double beside = k < 0 ? 0.0 : kOnePixel_rad;
-    const std::optional<double> real =
-        source_->SurfaceAlong(eye, (ray + beside * (round * across)).normalized());
-    if (real && std::abs(believed / *real - 1) <= kFalseDepth) return true;
-  }
-  return false;
-}
-
 GazeRun::DepthClaims GazeRun::CheckDepths() const {
   DepthClaims claims;
   if (newest_ == nullptr) return claims;
@@ -281,7 +272,7 @@ GazeRun::DepthClaims GazeRun::CheckDepths() const {
   for (const FeatureSnapshot& feature : newest_->features) {
     ++claims.total;
     if (!feature.depth_known) continue;
-    if (!IsOnASurface(eye, feature.point_in_world)) ++claims.false_depth;
+    if (!IsOnASurface(*source_, eye, feature.point_in_world)) ++claims.false_depth;
   }
   return claims;
 }

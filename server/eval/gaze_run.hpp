@@ -9,6 +9,7 @@
 #include <string>
 
 #include "server/anchors/anchor_manager.hpp"
+#include "server/eval/claims.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/statistics.hpp"
@@ -73,6 +74,7 @@ class GazeRun {
   // Sums so far.
   const RunRecorder& recorder() const { return recorder_; }
   const Trajectory& truth() const { return truth_; }
+  const ClaimLog& claims() const { return claims_; }
   const Sample& measured() const { return measured_; }  // features, of frames after the start-up
   double peak_rate_deg_s() const { return peak_rate_deg_s_; }
   double mean_searched_px2() const { return searched_px2_.size() ? searched_px2_.Mean() : 0; }
@@ -92,7 +94,6 @@ class GazeRun {
   absl::Status TakeFrame();
   std::optional<Annotation> Find(const std::string& id) const;
   absl::Status WriteClicks() const;
-  bool IsOnASurface(const Eigen::Vector3d& eye, const Eigen::Vector3d& point) const;
   absl::Status Record(const Frame& frame, const FrameCost& cost);
   void Control();
 
@@ -122,6 +123,7 @@ class GazeRun {
     Rigid3 world_from_camera;  // true
   };
   std::vector<PlacedClick> clicks_;
+  ClaimLog claims_;
   int requests_ = 0;
   Trajectory truth_;
   Sample measured_, searched_px2_;

@@ -11,6 +11,7 @@
 
 #include "server/eval/gaze_result.hpp"
 #include "server/eval/gaze_run.hpp"
+#include "server/eval/outline.hpp"
 
 namespace saccade {
 namespace {
@@ -153,22 +154,6 @@ absl::Status RunHorizon(GazeRun& run, const SimArguments& arguments, GazeResult&
                       [&] { result.squared_roll_deg.Add(std::pow(run.TrueRoll_deg(), 2)); });
 }
 
-/// Whether a click at the end of `line` hits the same thing a few pixels beside it. On an outline
-/// nobody can tell whether what is in front or what is behind is meant.
-bool IsOnItsThing(GazeRun& run, const Eigen::Vector3d& eye, const Eigen::Vector3d& line) {
-  constexpr double kBeside_rad = 0.012;  // 6 px
-  constexpr double kSameSurface = 0.05;  // of the distance
-  const Eigen::Vector3d ray = line.normalized();
-  const Eigen::Vector3d across = ray.cross(Eigen::Vector3d::UnitY()).normalized();
-  for (int k = 0; k < 8; ++k) {
-    const Eigen::AngleAxisd round(k * std::numbers::pi / 4.0, ray);
-    const Eigen::Vector3d beside = (ray + kBeside_rad * (round * across)).normalized();
-    const std::optional<double> surface = run.source().SurfaceAlong(eye, beside);
-    if (!surface || std::abs(*surface - line.norm()) > kSameSurface * line.norm()) return false;
-  }
-  return true;
-}
-
 /// Twelve named objects, round the wearer, that can be seen from where he starts.
 std::vector<Eigen::Vector3d> TourObjects(GazeRun& run) {
   const Rigid3 base = run.source().wearer().WorldFromShoulder(0);
@@ -178,7 +163,7 @@ std::vector<Eigen::Vector3d> TourObjects(GazeRun& run) {
     const std::optional<double> surface =
         run.source().SurfaceAlong(base.translation, line.normalized());
     if (surface && *surface < line.norm() - 0.02) continue;
-    if (!IsOnItsThing(run, base.translation, line)) continue;
+    if (IsOnOutline(run.source(), base.translation, object.point_in_world)) continue;
     const Eigen::Vector3d in_base = base.Inverse() * object.point_in_world;
     if (std::abs(std::atan2(in_base.y(), in_base.head<1>().norm() + std::abs(in_base.z()))) >
         50 * kDegree) {
@@ -325,7 +310,10 @@ absl::StatusOr<double> RunOnce(const SimArguments& arguments, const Scenario& sc
   const GazeRun::DepthClaims claims = run.CheckDepths();
   result.false_depth = claims.false_depth;
   result.features = claims.total;
-  if (const absl::Status closed = run.Close(); !closed.ok()) return closed;
+  result.claims.Add(run.claims(), 1.0);
+  for (const absl::Status& closed : {run.claims().Write(folder / "claims.csv", 1.0), run.Close()}) {
+    if (!closed.ok()) return closed;
+  }
   return run.mean_searched_px2();
 }
 

@@ -103,6 +103,8 @@ void AddSim(CLI::App& app, SimArguments& arguments) {
                   "reloc: recording of another place, where nothing may be recognised; may be "
                   "repeated")
       ->take_all();
+  sim->add_flag("--targetless", arguments.targetless,
+                "desk, walk and the like: start without the chessboard, in a map without metres");
   sim->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
 }
 

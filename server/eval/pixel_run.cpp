@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "server/eval/false_tracked.hpp"
+#include "server/eval/outline.hpp"
 #include "server/eval/registration.hpp"
 
 namespace saccade {
@@ -16,20 +17,6 @@ constexpr double kClickBorder_px = 40.0;  // nobody clicks the very edge
 constexpr int kClickTries = 50;
 constexpr double kOtherObject_m = 0.03;
 constexpr double kMinDistance_m = 0.25;
-
-const char* ToString(AnchorState state) {
-  switch (state) {
-    case AnchorState::kProvisional:
-      return "provisional";
-    case AnchorState::kTracking:
-      return "tracking";
-    case AnchorState::kPaused:
-      return "paused";
-    case AnchorState::kStopped:
-      return "stopped";
-  }
-  return "stopped";
-}
 
 std::string StampText(const Frame& frame) {
   return frame.source_timestamp.empty() ? absl::StrFormat("%.9f", Seconds(frame.capture_time_ns))
@@ -61,14 +48,17 @@ void PixelRunTotals::Add(const PixelRunTotals& other) {
   squared_px.Add(other.squared_px);
   squared_mm_per_m.Add(other.squared_mm_per_m);
   frame_ms.Add(other.frame_ms);
+  claims.Add(other.claims);
 }
 
 absl::StatusOr<PixelRun> PixelRun::Create(const SimOptions& options,
                                           const TrackerArguments& tracker, const ClickPlan& plan,
-                                          const std::filesystem::path& folder) {
+                                          bool targetless, const std::filesystem::path& folder) {
   absl::StatusOr<std::unique_ptr<SimSource>> source = SimSource::Open(options);
   if (!source.ok()) return source.status();
-  absl::StatusOr<TrackerSession> session = MakeTrackerSession((*source)->info(), tracker);
+  SourceInfo info = (*source)->info();
+  if (targetless) info.target.reset();
+  absl::StatusOr<TrackerSession> session = MakeTrackerSession(info, tracker);
   if (!session.ok()) return session.status();
   absl::StatusOr<RunRecorder> recorder = RunRecorder::Create(folder);
   if (!recorder.ok()) return recorder.status();
@@ -77,12 +67,12 @@ absl::StatusOr<PixelRun> PixelRun::Create(const SimOptions& options,
   absl::StatusOr<OutputFile> anchors = OutputFile::Create(folder / "anchors.csv");
   if (!anchors.ok()) return anchors.status();
   return PixelRun(*std::move(source), *std::move(session), *std::move(recorder), *std::move(truth),
-                  *std::move(anchors), options, plan);
+                  *std::move(anchors), options, plan, folder);
 }
 
 PixelRun::PixelRun(std::unique_ptr<SimSource> source, TrackerSession session, RunRecorder recorder,
                    OutputFile truth_file, OutputFile anchors_file, const SimOptions& options,
-                   const ClickPlan& plan)
+                   const ClickPlan& plan, const std::filesystem::path& folder)
     : source_(std::move(source)),
       session_(std::move(session)),
       recorder_(std::move(recorder)),
@@ -91,7 +81,8 @@ PixelRun::PixelRun(std::unique_ptr<SimSource> source, TrackerSession session, Ru
       plan_(plan),
       fps_(options.fps),
       rng_(options.seed),
-      ring_(std::make_unique<FrameRing>()) {
+      ring_(std::make_unique<FrameRing>()),
+      folder_(folder) {
   AnchorOptions anchor_options;
   if (source_->info().target) anchor_options.world_key = WorldKey(*source_->info().target);
   anchors_ = std::make_unique<AnchorManager>(
@@ -125,7 +116,13 @@ absl::StatusOr<std::optional<double>> PixelRun::Run(PixelRunTotals& totals) {
   }
   const absl::StatusOr<TrajectoryScore> score =
       Score(Associate(recorder_.trajectory(), truth_), Alignment::kSe3);
-  return score.ok() ? std::optional(score->ate_se3_m) : std::nullopt;
+  const double scale = metric_ || !score.ok() ? 1.0 : score->scale;
+  totals.claims.Add(claims_, scale);
+  if (const absl::Status status = claims_.Write(folder_ / "claims.csv", scale); !status.ok()) {
+    return status;
+  }
+  if (!score.ok()) return std::nullopt;
+  return metric_ ? score->ate_se3_m : score->ate_sim3_m;
 }
 
 absl::Status PixelRun::Step(const Frame& frame, PixelRunTotals& totals) {
@@ -142,19 +139,24 @@ absl::Status PixelRun::Step(const Frame& frame, PixelRunTotals& totals) {
   FrameVerdict verdict = VerdictOf(*snapshot);
   const bool pose_published =
       verdict == FrameVerdict::kTracked || verdict == FrameVerdict::kCoasting;
+  metric_ = snapshot->metric;
   if (verdict == FrameVerdict::kTracked) {
     const Rigid3& claimed = snapshot->world_from_camera;
     claimed_.push_back({frame.capture_time_ns, claimed, truth});
     const double error_m = (claimed.translation - truth.translation).norm();
-    totals.false_tracked_frames += !(error_m <= kFalseTracked_m) ? 1 : 0;
+    totals.false_tracked_frames += metric_ && !(error_m <= kFalseTracked_m) ? 1 : 0;
   }
-  if (pose_published && IsLost(snapshot->world_from_camera, truth)) verdict = FrameVerdict::kLost;
+  // Without metres the world is another one: nothing to compare with before the end.
+  if (pose_published && metric_ && IsLost(snapshot->world_from_camera, truth)) {
+    verdict = FrameVerdict::kLost;
+  }
   if (const absl::Status status = recorder_.Add(frame, *snapshot, cost, verdict); !status.ok()) {
     return status;
   }
   ring_->Push({std::make_shared<const Frame>(frame), snapshot});
   anchors_->Resolve(snapshot, *frame.camera);
   ClickIfDue(frame.id, totals);
+  WatchClaims(frame, *snapshot, pose_published);
   CompareAnchors(frame, *snapshot, pose_published, totals);
   return anchors_file_.status().ok() ? truth_file_.status() : anchors_file_.status();
 }
@@ -184,6 +186,11 @@ void PixelRun::ClickIfDue(FrameId now, PixelRunTotals& totals) {
   }
   anchors_->Committed(edit->change.sequence);
   clicked_.push_back({edit->annotation.id, clicks_, surface->point_in_world});
+  const Rigid3 eye = source_->WorldFromCamera(seen);
+  claims_.Place({edit->annotation.id, clicks_, time_s, surface->pixel,
+                 (surface->point_in_world - eye.translation).norm(),
+                 IsOnOutline(*source_, eye.translation, surface->point_in_world),
+                 surface->point_in_world});
 }
 
 std::optional<PixelRun::SurfacePixel> PixelRun::PickSurface(FrameId frame) {
@@ -212,6 +219,17 @@ std::optional<PixelRun::SurfacePixel> PixelRun::PickSurface(FrameId frame) {
     return SurfacePixel{pixel, *point};
   }
   return std::nullopt;
+}
+
+void PixelRun::WatchClaims(const Frame& frame, const MapSnapshot& snapshot, bool pose_published) {
+  const ClaimFrame seen{static_cast<double>(frame.id) / fps_,
+                        pose_published,
+                        snapshot.metric,
+                        frame.camera.get(),
+                        snapshot.world_from_camera,
+                        source_->WorldFromCamera(frame.id)};
+  claims_.Observe(seen, *anchors_->Latest(),
+                  [&](const Eigen::Vector3d& point) { return source_->Visible(frame.id, point); });
 }
 
 void PixelRun::CompareAnchors(const Frame& frame, const MapSnapshot& snapshot, bool pose_published,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/anchors/anchor_manager.hpp"
+#include "server/eval/claims.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/scale_windows.hpp"
@@ -37,17 +38,19 @@ struct PixelRunTotals {
   std::uint64_t drawn_views = 0;
   Sample squared_px, squared_mm_per_m;
   Sample frame_ms;
+  ClaimTotals claims;
 
   void Add(const PixelRunTotals& other);
 };
 
 /// One run through pixels: renders, tracks, clicks, compares; writes trajectory.tum,
-/// groundtruth.txt, frames.csv and anchors.csv into a folder. Simulated time: nothing depends on
-/// how long a frame takes.
+/// groundtruth.txt, frames.csv, anchors.csv and claims.csv into a folder. Simulated time: nothing
+/// depends on how long a frame takes.
 class PixelRun {
  public:
+  /// `targetless`: the tracker is not told of the chessboard; its map has no metres then.
   static absl::StatusOr<PixelRun> Create(const SimOptions& options, const TrackerArguments& tracker,
-                                         const ClickPlan& plan,
+                                         const ClickPlan& plan, bool targetless,
                                          const std::filesystem::path& folder);
   PixelRun(PixelRun&&) = default;
 
@@ -65,7 +68,7 @@ class PixelRun {
 
   PixelRun(std::unique_ptr<SimSource> source, TrackerSession session, RunRecorder recorder,
            OutputFile truth_file, OutputFile anchors_file, const SimOptions& options,
-           const ClickPlan& plan);
+           const ClickPlan& plan, const std::filesystem::path& folder);
   absl::Status Step(const Frame& frame, PixelRunTotals& totals);
   void ClickIfDue(FrameId now, PixelRunTotals& totals);
   /// A pixel of `frame` that shows a surface, and the point it shows.
@@ -74,6 +77,7 @@ class PixelRun {
     Eigen::Vector3d point_in_world;
   };
   std::optional<SurfacePixel> PickSurface(FrameId frame);
+  void WatchClaims(const Frame& frame, const MapSnapshot& snapshot, bool pose_published);
   void CompareAnchors(const Frame& frame, const MapSnapshot& snapshot, bool pose_published,
                       PixelRunTotals& totals);
 
@@ -87,6 +91,9 @@ class PixelRun {
   std::unique_ptr<FrameRing> ring_;
   std::unique_ptr<AnchorManager> anchors_;
   std::vector<Clicked> clicked_;
+  ClaimLog claims_;
+  std::filesystem::path folder_;
+  bool metric_ = false;  // of the newest map
   Trajectory truth_;
   std::vector<PosePair> claimed_;  // poses published as tracked, wrong ones too
   int clicks_ = 0;

@@ -67,6 +67,7 @@ Json PixelReport(const SimArguments& arguments, const PixelRunTotals& totals, co
                         {"p95", totals.frame_ms.Percentile(95)},
                         {"p99", totals.frame_ms.Percentile(99)},
                         {"max", totals.frame_ms.Max()}};
+  report["claims"] = totals.claims.Report();
   return report;
 }
 
@@ -80,8 +81,9 @@ absl::StatusOr<Json> RunPixels(const SimArguments& arguments, SimMotion motion) 
     options.motion = motion;
     options.duration_s = arguments.duration_s;
     PixelRunTotals own;
-    absl::StatusOr<PixelRun> pixels = PixelRun::Create(
-        options, arguments.tracker, ClickPlan(), arguments.out / absl::StrFormat("run-%03d", run));
+    absl::StatusOr<PixelRun> pixels =
+        PixelRun::Create(options, arguments.tracker, ClickPlan(), arguments.targetless,
+                         arguments.out / absl::StrFormat("run-%03d", run));
     if (!pixels.ok()) return pixels.status();
     const absl::StatusOr<std::optional<double>> ate = pixels->Run(own);
     if (!ate.ok()) return ate.status();
@@ -104,9 +106,34 @@ absl::StatusOr<Json> RunPixels(const SimArguments& arguments, SimMotion motion) 
   return report;
 }
 
+/// Claims have a level of their own: a line each.
+void AddClaims(const Json& claims, std::string& text) {
+  const auto add = [&text](const std::string& name, const Json& each) {
+    if (each.is_object()) {
+      for (const auto& [kind, figures] : each.items()) {
+        absl::StrAppendFormat(&text, "claims: %-20s %s\n", absl::StrCat(name, ", ", kind),
+                              figures.dump());
+      }
+    } else {
+      absl::StrAppendFormat(&text, "claims: %-20s %s\n", name, each.dump());
+    }
+  };
+  for (const auto& [key, value] : claims.items()) {
+    if (key != "by_method" && key != "by_age") {
+      add(key, value);
+      continue;
+    }
+    for (const auto& [name, each] : value.items()) add(name, each);
+  }
+}
+
 std::string Table(const Json& report) {
   std::string text;
   for (const auto& [key, value] : report.items()) {
+    if (key == "claims") {
+      AddClaims(value, text);
+      continue;
+    }
     if (key != "per_run") absl::StrAppendFormat(&text, "%-28s %s\n", key, value.dump());
   }
   return text;
