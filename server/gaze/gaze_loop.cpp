@@ -11,9 +11,16 @@ namespace {
 
 constexpr double kSureOfRotation_rad = 0.02;  // 1 sigma, worst axis
 
+constexpr int kFollowed = 12;  // matches by which a turn is followed
+
+/// Before distances are known a camera's direction is: it can be turned, and has to be, perhaps.
+bool FollowsTurns(const MapSnapshot& map) {
+  return map.status == TrackingStatus::kInitialising && map.matched >= kFollowed;
+}
+
 /// Not while coasting: that is the tracker's guess, and the wearer's own prediction knows the head.
 bool HasPose(const MapSnapshot& map) {
-  return map.status == TrackingStatus::kTracking &&
+  return (map.status == TrackingStatus::kTracking || FollowsTurns(map)) &&
          map.pose_covariance.diagonal().tail<3>().maxCoeff() <
              kSureOfRotation_rad * kSureOfRotation_rad;
 }
@@ -179,7 +186,8 @@ void GazeLoop::OnView(const GazeView& view) {
   if (calibration_.running()) return calibration_.OnView(*view.map);
   controller_.SetDown(view.down_in_world);
   const TrackingStatus status = view.map->status;
-  if (view.angles && (status == TrackingStatus::kTracking || status == TrackingStatus::kCoasting)) {
+  if (view.angles && (status == TrackingStatus::kTracking || status == TrackingStatus::kCoasting ||
+                      FollowsTurns(*view.map))) {
     controller_.ObservePose(
         {view.map->capture_time_ns, view.map->world_from_camera, *view.angles, HasPose(*view.map)});
   }

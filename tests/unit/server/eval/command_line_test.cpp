@@ -113,7 +113,9 @@ TEST_F(SaccadeEval, RecordWritesARecordingThatRuns) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto report = nlohmann::json::parse(run.out);
   EXPECT_EQ(report["frames"].get<int>(), 60);
-  EXPECT_GT(report["tracked_frames"].get<int>(), 40);
+  // It hardly does more than turn: until the scale is held it is initialising, and never lost.
+  EXPECT_GT(report["tracked_frames"].get<int>(), 10);
+  EXPECT_EQ(report["tracked_frames"].get<int>() + report["initialising_frames"].get<int>(), 60);
   EXPECT_LT(report["ate_sim3_m"].get<double>(), 0.01);
 
   const Result thinned =

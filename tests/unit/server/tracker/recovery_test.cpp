@@ -130,7 +130,7 @@ TEST_F(Recovery, AGapInTimeOfWhateverLengthIsANewStartInTheMapAtTheCostOfAFrame)
     EXPECT_EQ(last->map_generation, 0) << "the same map";
     const Rigid3& then = poses_[frame + k - 1];
     EXPECT_LT((last->world_from_camera.translation - then.translation).norm(), 0.04);
-    frame -= 40;
+    frame -= 55;
   }
 }
 

@@ -1,0 +1,110 @@
+// The start without a target, on a recording: tracked when the pictures hold the scale, not before.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <vector>
+
+#include "server/capture/dataset.hpp"
+#include "server/tracker/tracker.hpp"
+
+namespace saccade {
+namespace {
+
+using Snapshot = std::shared_ptr<const MapSnapshot>;
+
+class StartOfRecording : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::filesystem::path folder =
+        std::filesystem::path(SACCADE_SOURCE_DIR) / "../shared/data/tum_fr1_xyz";
+    if (!std::filesystem::exists(folder)) GTEST_SKIP() << "data set tum_fr1_xyz is not here";
+    SourceOptions options;
+    options.end_frame = 60;
+    auto source = OpenDataset(folder, options);
+    ASSERT_TRUE(source.ok()) << source.status();
+    info_ = (*source)->info();
+    for (auto frame = (*source)->Next(); frame.ok() && *frame; frame = (*source)->Next()) {
+      frames_.push_back(**frame);
+    }
+    Begin(TrackerOptions());
+  }
+
+  void Begin(const TrackerOptions& options) {
+    auto created = Tracker::Create(info_, options);
+    ASSERT_TRUE(created.ok()) << created.status();
+    tracker_ = *std::move(created);
+    shown_ = 0;
+  }
+
+  Snapshot Show(std::size_t index) {
+    Frame frame = frames_[index];
+    frame.id = shown_;
+    frame.capture_time_ns = 1'000'000'000 + static_cast<Timestamp>(shown_++) * 33'333'333;
+    return tracker_->Track(frame);
+  }
+
+  SourceInfo info_;
+  std::vector<Frame> frames_;
+  std::unique_ptr<Tracker> tracker_;
+  FrameId shown_ = 0;
+};
+
+TEST_F(StartOfRecording, AMovingCameraWaitsUnderASecondAndAHalf) {
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < 45 && first == 0; ++k) {
+    if (Show(k)->status == TrackingStatus::kTracking) first = k;
+  }
+  EXPECT_GT(first, 2u);
+  EXPECT_LT(first, 45u);
+}
+
+TEST_F(StartOfRecording, ACameraAtRestIsNotCalledTracked) {
+  Snapshot last;
+  for (int k = 0; k < 60; ++k) {
+    last = Show(0);
+    ASSERT_EQ(last->status, TrackingStatus::kInitialising) << k;
+  }
+  EXPECT_FALSE(last->advice.empty());
+  EXPECT_GT(last->matched, 40);
+  const std::uint64_t before = last->map_revision;
+  for (std::size_t k = 0; k < 60; ++k) last = Show(k);
+  EXPECT_EQ(last->status, TrackingStatus::kTracking);
+  EXPECT_GT(last->map_revision, before) << "the map was found anew: what was placed has moved";
+}
+
+TEST_F(StartOfRecording, WhatWasSeenFirstIsStillThereAfterwards) {
+  const Snapshot first = Show(0);
+  Snapshot last;
+  for (std::size_t k = 1; k < 30; ++k) last = Show(k);
+  ASSERT_EQ(last->status, TrackingStatus::kTracking);
+  std::size_t kept = 0, known = 0;
+  for (const FeatureSnapshot& before : first->features) {
+    for (const FeatureSnapshot& now : last->features) {
+      kept += now.id == before.id ? 1 : 0;
+      known += now.id == before.id && now.depth_known ? 1 : 0;
+    }
+  }
+  EXPECT_GT(2 * kept, first->features.size());
+  EXPECT_GT(2 * known, kept);
+}
+
+TEST_F(StartOfRecording, TheOldStartDoesNotWait) {
+  TrackerOptions options;
+  options.start = false;
+  Begin(options);
+  Snapshot last;
+  for (int k = 0; k < 20; ++k) last = Show(0);
+  EXPECT_EQ(last->status, TrackingStatus::kTracking) << "or there is nothing to compare with";
+}
+
+TEST_F(StartOfRecording, TwoRunsAreTheSameToTheBit) {
+  std::vector<Rigid3> first;
+  for (std::size_t k = 0; k < 40; ++k) first.push_back(Show(k)->world_from_camera);
+  Begin(TrackerOptions());
+  for (std::size_t k = 0; k < 40; ++k) {
+    EXPECT_EQ(Show(k)->world_from_camera.translation, first[k].translation) << k;
+  }
+}
+
+}  // namespace
+}  // namespace saccade
