@@ -1,39 +1,17 @@
 #include "server/map/bundle_adjustment.hpp"
 
-#include <ceres/ceres.h>
 #include <glog/logging.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "server/filter/point_model.hpp"
+#include "server/map/bundle_costs.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr double kBehind = 1e-3;     // cosine below which a ray is not seen
 constexpr double kLossSigmas = 1.0;  // matches' sigmas are set with a margin
-
-template <typename T>
-using Vec3 = Eigen::Matrix<T, 3, 1>;
-
-/// Keyframe: [x y z w | translation], as Eigen stores them.
-using PoseBlock = std::array<double, 7>;
-/// Point: [tangent u v | inverse range].
-using PointBlock = std::array<double, 3>;
-
-PoseBlock Pack(const Rigid3& pose) {
-  PoseBlock block;
-  Eigen::Map<Eigen::Quaterniond>(block.data()) = pose.rotation;
-  Eigen::Map<Eigen::Vector3d>(block.data() + 4) = pose.translation;
-  return block;
-}
-
-Rigid3 Unpack(const PoseBlock& block) {
-  return {Eigen::Map<const Eigen::Quaterniond>(block.data()).normalized(),
-          Eigen::Map<const Eigen::Vector3d>(block.data() + 4)};
-}
 
 /// Tangent coordinates of `direction` (any length) around a measured ray, in sigmas.
 struct RayError {
@@ -53,28 +31,13 @@ struct RayError {
   Eigen::Matrix<double, 3, 2> weighted_basis;
 };
 
-struct BearingOf {
-  Eigen::Vector3d bearing;
-  Eigen::Matrix<double, 3, 2> basis;
-
-  template <typename T>
-  Vec3<T> operator()(const T* point) const {
-    const Vec3<T> moved =
-        bearing.cast<T>() + basis.col(0).cast<T>() * point[0] + basis.col(1).cast<T>() * point[1];
-    return moved.normalized();
-  }
-};
-
 struct SightingCost {
   RayError error;
   BearingOf bearing;
 
   template <typename T>
   bool operator()(const T* camera, const T* anchor, const T* point, T* residual) const {
-    const Eigen::Map<const Eigen::Quaternion<T>> turn_camera(camera), turn_anchor(anchor);
-    const Eigen::Map<const Vec3<T>> at_camera(camera + 4), at_anchor(anchor + 4);
-    const Vec3<T> in_world = turn_anchor * bearing(point) + point[2] * (at_anchor - at_camera);
-    return error(Vec3<T>(turn_camera.conjugate() * in_world), residual);
+    return error(DirectionIn(camera, anchor, point, bearing), residual);
   }
 };
 
@@ -100,17 +63,6 @@ struct KnownCost {
     const Eigen::Map<const Vec3<T>> at(camera + 4);
     return error(Vec3<T>(turn.conjugate() * (point.cast<T>() - at)), residual);
   }
-};
-
-class Stopper : public ceres::IterationCallback {
- public:
-  explicit Stopper(const std::atomic<bool>& stop) : stop_(stop) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return stop_ ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
-  }
-
- private:
-  const std::atomic<bool>& stop_;
 };
 
 /// The problem as Ceres sees it; blocks keep their addresses.
@@ -198,8 +150,6 @@ class Adjustment {
   }
 
   void Constrain() {
-    using PoseManifold =
-        ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
     int fixed = 0;
     for (std::size_t k = 0; k < poses_.size(); ++k) {
       double* block = poses_[k].data();

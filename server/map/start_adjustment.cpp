@@ -1,13 +1,11 @@
 #include "server/map/start_adjustment.hpp"
 
-#include <ceres/ceres.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
-#include "server/filter/point_model.hpp"
+#include "server/map/bundle_costs.hpp"
+#include "server/map/start_evidence.hpp"
 #include "server/map/start_guess.hpp"
 
 namespace saccade {
@@ -16,19 +14,11 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-constexpr double kBehind = 1e-3;      // cosine below which a ray is not seen
-constexpr double kLossSigmas = 1.0;   // matches' sigmas are set with a margin
-constexpr double kRangeShare = 2.0;   // sigma of the guess of an inverse range, of the median
-constexpr double kKnownShare = 0.25;  // sigma / inverse range of a point that counts as known
-constexpr double kAgreeSigmas = 3.0;
+constexpr double kBehind = 1e-3;     // cosine below which a ray is not seen
+constexpr double kLossSigmas = 1.0;  // matches' sigmas are set with a margin
+constexpr double kRangeShare = 2.0;  // sigma of the guess of an inverse range, of the median
 constexpr int kIterations = 30;
 constexpr int kFewestPoints = 12, kFewestKeyframes = 3;
-
-template <typename T>
-using Vec3 = Eigen::Matrix<T, 3, 1>;
-
-using PoseBlock = std::array<double, 7>;   // [x y z w | translation]
-using PointBlock = std::array<double, 3>;  // [tangent u v | inverse range]
 
 /// Tangent coordinates of a direction (any length) around a measured ray, in sigmas.
 struct RayError {
@@ -49,18 +39,6 @@ struct RayError {
   Eigen::Matrix<double, 3, 2> weighted_basis;
 };
 
-struct BearingOf {
-  Vector3d bearing;
-  Eigen::Matrix<double, 3, 2> basis;
-
-  template <typename T>
-  Vec3<T> operator()(const T* point) const {
-    const Vec3<T> moved =
-        bearing.cast<T>() + basis.col(0).cast<T>() * point[0] + basis.col(1).cast<T>() * point[1];
-    return moved.normalized();
-  }
-};
-
 struct SightingCost {
   RayError error;
   BearingOf bearing;
@@ -68,10 +46,7 @@ struct SightingCost {
   template <typename T>
   bool operator()(const T* camera, const T* anchor, const T* point, const T* readout,
                   T* residual) const {
-    const Eigen::Map<const Eigen::Quaternion<T>> turn_camera(camera), turn_anchor(anchor);
-    const Eigen::Map<const Vec3<T>> at_camera(camera + 4), at_anchor(anchor + 4);
-    const Vec3<T> in_world = turn_anchor * bearing(point) + point[2] * (at_anchor - at_camera);
-    return error(Vec3<T>(turn_camera.conjugate() * in_world), readout, residual);
+    return error(DirectionIn(camera, anchor, point, bearing), readout, residual);
   }
 };
 
@@ -96,25 +71,12 @@ struct ReadoutCost {
   }
 };
 
-class Stopper : public ceres::IterationCallback {
- public:
-  explicit Stopper(const std::atomic<bool>& stop) : stop_(stop) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return stop_ ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
-  }
-
- private:
-  const std::atomic<bool>& stop_;
-};
-
 /// The problem as Ceres sees it; blocks keep their addresses.
 class Adjustment {
  public:
   explicit Adjustment(const StartProblem& start) : start_(start), readout_(start.readout_s) {
     for (const Rigid3& pose : start.world_from_camera) {
-      PoseBlock& block = poses_.emplace_back();
-      Eigen::Map<Eigen::Quaterniond>(block.data()) = pose.rotation;
-      Eigen::Map<Vector3d>(block.data() + 4) = pose.translation;
+      poses_.push_back(Pack(pose));
     }
     for (const StartPoint& point : start.points) {
       points_.push_back({0.0, 0.0, point.inverse_range});
@@ -149,9 +111,7 @@ class Adjustment {
   StartProblem Estimates() const {
     StartProblem found = start_;
     for (std::size_t k = 0; k < poses_.size(); ++k) {
-      found.world_from_camera[k] = {
-          Eigen::Map<const Eigen::Quaterniond>(poses_[k].data()).normalized(),
-          Eigen::Map<const Vector3d>(poses_[k].data() + 4)};
+      found.world_from_camera[k] = Unpack(poses_[k]);
     }
     for (std::size_t k = 0; k < points_.size(); ++k) {
       found.points[k].bearing = bearings_[k](points_[k].data());
@@ -216,8 +176,6 @@ class Adjustment {
   }
 
   void Constrain() {
-    using PoseManifold =
-        ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
     for (PoseBlock& pose : poses_) problem_.SetManifold(pose.data(), new PoseManifold);
     problem_.SetParameterBlockConstant(poses_.front().data());
   }
@@ -229,84 +187,6 @@ class Adjustment {
   double readout_;
   ceres::Problem problem_;
 };
-
-/// From Ceres' errors (half turns in the world, tangents of the first bearings) to ours.
-MatrixXd ToOurErrors(const StartProblem& found, const std::vector<BearingOf>& bearings,
-                     const MatrixXd& covariance) {
-  const auto keyframes = std::ssize(found.world_from_camera);
-  MatrixXd j = MatrixXd::Zero(covariance.rows(), covariance.rows());
-  j(0, 0) = 1.0;
-  for (Eigen::Index k = 0; k < keyframes; ++k) {
-    const Rigid3& pose = found.world_from_camera[static_cast<std::size_t>(k)];
-    j.block<3, 3>(1 + 6 * k, 1 + 6 * k + 3).setIdentity();
-    j.block<3, 3>(1 + 6 * k + 3, 1 + 6 * k) = 2.0 * pose.RotationMatrix().transpose();
-  }
-  for (std::size_t k = 0; k < found.points.size(); ++k) {
-    const Eigen::Index at = 1 + 6 * keyframes + 3 * static_cast<Eigen::Index>(k);
-    j.block<2, 2>(at, at) = TangentBasis(found.points[k].bearing).transpose() * bearings[k].basis;
-    j(at + 2, at + 2) = 1.0;
-  }
-  return j * covariance * j.transpose();
-}
-
-/// The scale direction is taken out: what it would do to the inverse ranges on the whole is held.
-void HoldScale(const StartProblem& found, MatrixXd& information) {
-  const Eigen::Index first = 1 + 6 * std::ssize(found.world_from_camera);
-  Eigen::VectorXd row = Eigen::VectorXd::Zero(information.rows());
-  double total = 0.0;
-  for (std::size_t k = 0; k < found.points.size(); ++k) {
-    const Eigen::Index at = first + 3 * static_cast<Eigen::Index>(k) + 2;
-    const double rho = found.points[k].inverse_range;
-    if (rho <= 0.0) continue;
-    row[at] = rho * information(at, at);
-    total += rho * rho * information(at, at);
-  }
-  if (total <= 0.0) return;
-  constexpr double kHeld = 1e-5;  // relative sigma
-  row /= total * kHeld;
-  information += row * row.transpose();
-}
-
-StartEvidence Weigh(const StartProblem& found, const MatrixXd& covariance,
-                    const Eigen::VectorXd& residuals) {
-  StartEvidence evidence;
-  const Eigen::Index keyframes = std::ssize(found.world_from_camera);
-  for (Eigen::Index k = 1; k < keyframes; ++k) {
-    for (Eigen::Index l = 0; l < k; ++l) {
-      const Vector3d way = found.world_from_camera[static_cast<std::size_t>(k)].translation -
-                           found.world_from_camera[static_cast<std::size_t>(l)].translation;
-      const double squared = way.squaredNorm();
-      if (squared <= 0.0) continue;
-      const auto block = [&](Eigen::Index a, Eigen::Index b) {
-        return way.dot(covariance.block<3, 3>(1 + 6 * a, 1 + 6 * b) * way) / squared;
-      };
-      const double variance = (block(k, k) + block(l, l) - 2.0 * block(k, l)) / squared;
-      evidence.scale_sigma = std::min(evidence.scale_sigma, std::sqrt(std::max(0.0, variance)));
-    }
-  }
-  for (std::size_t k = 0; k < found.points.size(); ++k) {
-    const Eigen::Index at = 1 + 6 * keyframes + 3 * static_cast<Eigen::Index>(k) + 2;
-    const double rho = found.points[k].inverse_range;
-    evidence.known_points +=
-        rho > 0.0 && covariance(at, at) < kKnownShare * kKnownShare * rho * rho ? 1 : 0;
-  }
-  const Eigen::Index from = 3 * std::ssize(found.points);
-  const Eigen::Index count = (residuals.size() - from) / 2;
-  Eigen::Index agree = 0;
-  double sum = 0.0;
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const double squared = residuals.segment<2>(from + 2 * k).squaredNorm();
-    // The loss has been applied: |r|^2 as it counts.
-    const double plain = std::expm1(std::min(50.0, squared));
-    agree += plain < kAgreeSigmas * kAgreeSigmas ? 1 : 0;
-    sum += std::min(plain, kAgreeSigmas * kAgreeSigmas);
-  }
-  if (count == 0) return evidence;
-  evidence.agreeing = static_cast<double>(agree) / static_cast<double>(count);
-  const double unknowns = 6.0 * static_cast<double>(keyframes - 1) + std::ssize(found.points);
-  evidence.noise = std::sqrt(sum / std::max(1.0, 2.0 * static_cast<double>(count) - unknowns));
-  return evidence;
-}
 
 struct Attempt {
   std::unique_ptr<StartProblem> guess;  // what the adjustment was made of
@@ -334,16 +214,6 @@ std::vector<Attempt> Attempts(const StartProblem& problem, const std::atomic<boo
     from(Reversed(last ? attempts.back().found : attempts.front().found));
   }
   return attempts;
-}
-
-/// Whether the camera goes the same way in both.
-bool GoAlike(const StartProblem& a, const StartProblem& b) {
-  constexpr double kCosine = 0.7;
-  const auto way = [](const StartProblem& found) {
-    return Vector3d(found.world_from_camera.back().translation -
-                    found.world_from_camera.front().translation);
-  };
-  return way(a).dot(way(b)) > kCosine * way(a).norm() * way(b).norm();
 }
 
 }  // namespace
@@ -380,30 +250,6 @@ std::optional<StartSolution> SolveStart(const StartProblem& problem,
     solution.evidence.margin = std::min(solution.evidence.margin, other.cost - chosen->cost);
   }
   return solution;
-}
-
-void ScaleTo(double range, StartSolution& solution) {
-  StartProblem& found = solution.problem;
-  std::vector<double> all;
-  for (const StartPoint& point : found.points) all.push_back(point.inverse_range);
-  std::nth_element(all.begin(), all.begin() + std::ssize(all) / 2, all.end());
-  const double median = all[all.size() / 2];
-  if (median <= 0.0) return;
-  const double scale = range * median;  // of lengths
-  const Vector3d origin = found.world_from_camera.front().translation;
-  Eigen::VectorXd by = Eigen::VectorXd::Ones(solution.covariance.rows());
-  Eigen::Index at = 1;
-  for (Rigid3& pose : found.world_from_camera) {
-    pose.translation = origin + scale * (pose.translation - origin);
-    by.segment<3>(at).setConstant(scale);
-    at += 6;
-  }
-  for (StartPoint& point : found.points) {
-    point.inverse_range /= scale;
-    by[at + 2] = 1.0 / scale;
-    at += 3;
-  }
-  solution.covariance = by.asDiagonal() * solution.covariance * by.asDiagonal();
 }
 
 }  // namespace saccade

@@ -10,10 +10,10 @@ constexpr int kConfirmations = 3;       // frames after a relocalisation
 constexpr double kConfirmed = 0.6;      // of attempts there (slam-spec 6)
 constexpr int kLongestSuspension = 60;  // frames
 // A view that jumps is found again by a few false matches that agree by chance: 5 of 20 did.
-constexpr double kDoubtful = 0.35;    // of attempts: below, the pose is not believed at once...
-constexpr double kConvincing = 0.45;  // ...until so many succeed...
-constexpr int kConvincingInRow = 3;   // ...in so many frames in a row
-constexpr int kFew = 8;               // matches: fewer need kFewShare of the attempts
+constexpr double kDoubtful = 0.3;    // of attempts: below, the pose is not believed at once...
+constexpr double kConvincing = 0.4;  // ...until so many succeed...
+constexpr int kConvincingInRow = 2;  // ...in so many frames in a row
+constexpr int kFew = 8;              // matches: fewer need kFewShare of the attempts
 constexpr double kFewShare = 0.6;
 constexpr int kLongestDoubt = 15;  // frames
 

@@ -1,5 +1,7 @@
 #include "server/tracker/tracker_impl.hpp"
 
+#include <cstring>
+
 #include "server/capture/gap.hpp"
 #include "server/pipeline/stop_watch.hpp"
 #include "server/tracker/encoder_motion.hpp"
@@ -13,7 +15,17 @@ constexpr int kLongestSettling = 15;     // frames: under pure rotation depth ne
 constexpr double kSettledDepth = 0.25;   // sigma / inverse range
 constexpr int kFewestToUpdate = 3;       // matches: fewer can agree by chance
 constexpr double kLooseTie_rad = 0.005;  // of what is in view to the clone that errors count from
+constexpr int kRepeats = 2;              // of a picture, as a source does that fills up its rate
 constexpr double kSurprise = 3.0;        // times the motion noise, after an unexpected move
+
+bool SamePicture(const cv::Mat& a, const cv::Mat& b) {
+  if (a.size() != b.size() || a.type() != b.type()) return false;
+  const std::size_t bytes = static_cast<std::size_t>(a.cols) * a.elemSize();
+  for (int row = 0; row < a.rows; ++row) {
+    if (std::memcmp(a.ptr(row), b.ptr(row), bytes) != 0) return false;
+  }
+  return true;
+}
 
 /// The camera's own word on its shutter, else the filter finds out.
 FilterOptions MakeFilterOptions(const TrackerOptions& options, const CameraModel& camera) {
@@ -91,6 +103,12 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   if (!usable || (has_frame_ && dt <= 0.0 && !gap) || !pyramid_.Build(frame.grey).ok()) {
     return Publish(frame, times_);
   }
+  // One picture again is no measurement: what moves meanwhile is a gap when the next one comes.
+  if (has_frame_ && !gap && SamePicture(frame.grey, last_frame_.grey)) {
+    if (started_ && ++repeated_ > kRepeats) monitor_.Suspend();
+    return Publish(frame, times_);
+  }
+  repeated_ = 0;
   if (gap) ResumeAfterGap();
   previous_mount_ = has_frame_ ? last_frame_.mount : std::nullopt;
   last_frame_ = frame;

@@ -104,6 +104,7 @@ class Tracker::Impl {
   Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows
   std::optional<MountAngles> previous_mount_;  // of the frame before it
   bool has_frame_ = false;
+  int repeated_ = 0;  // times that the newest picture came again
   bool started_ = false;
   bool metric_ = false;
   bool held_ = false;  // the map's scale is: by a target, or by what was seen from different places

@@ -125,7 +125,7 @@ export class Session {
     this.attempt?.abort();
   }
 
-  /** A frame of the server's ring as PNG, without loss, as captured. */
+  /** A frame of the server's ring as PNG, as it was kept: grey without loss. */
   async fetchPng(frameId: number): Promise<Uint8Array<ArrayBuffer>> {
     const request = { frameId: BigInt(frameId), view: VideoView.RAW };
     const { png } = await this.clients.session.getFrame(request, { timeoutMs: 5000 });

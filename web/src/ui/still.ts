@@ -4,7 +4,7 @@ import type { Feature, FrameFacts } from '../session/types';
 
 /**
  * A frame held on the screen, to be looked at and clicked while the live picture goes on. At once as
- * it was decoded, and without loss as soon as the server has sent it.
+ * it was decoded, and as the server has kept it (grey without loss) as soon as that is there.
  */
 export class Still {
   readonly canvas = document.createElement('canvas');

@@ -24,9 +24,10 @@ export async function frozenPicture(context) {
   await sleep(1000);
   const [live, marks] = [(await expert.look()).id, (await expert.marks()).id];
   check(
-    'frozen: the very frame without loss, its marks, and the live picture goes on',
-    Number(kept.frameId) === id && ratio === Infinity && marks === id && live > id,
-    `frame ${id}, PSNR ${ratio}; marks of ${marks}, live at ${live}`,
+    // Kept frames have their grey bit by bit, their colour at half the resolution.
+    'frozen: the very frame, its marks, and the live picture goes on',
+    Number(kept.frameId) === id && ratio > 45 && marks === id && live > id,
+    `frame ${id}, PSNR ${ratio.toFixed(1)} dB; marks of ${marks}, live at ${live}`,
   );
 
   for (const gone of [false, true]) {

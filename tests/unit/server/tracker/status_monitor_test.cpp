@@ -32,7 +32,7 @@ TEST(StatusMonitor, WhatAFewMatchesAgreeOnIsBelievedWhenMoreDo) {
   StatusMonitor monitor = Tracking();
   monitor.Record(20, 5, true);  // after a gap: five of twenty agreed, 40 cm off
   EXPECT_EQ(monitor.status(), TrackingStatus::kCoasting);
-  for (int k = 0; k < 2; ++k) monitor.Record(50, 30, true);
+  monitor.Record(50, 30, true);
   EXPECT_EQ(monitor.status(), TrackingStatus::kCoasting);
   monitor.Record(50, 30, true);
   EXPECT_EQ(monitor.status(), TrackingStatus::kTracking);
@@ -42,7 +42,7 @@ TEST(StatusMonitor, LastingDoubtIsLost) {
   StatusMonitor monitor = Tracking();
   int frames = 0;
   while (monitor.status() != TrackingStatus::kLost && frames < 100) {
-    monitor.Record(50, 16, true);
+    monitor.Record(50, 14, true);
     EXPECT_NE(monitor.status(), TrackingStatus::kTracking);
     ++frames;
   }
