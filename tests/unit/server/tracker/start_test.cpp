@@ -123,12 +123,15 @@ TEST_F(StartOfRecording, APictureThatComesAgainIsNoMeasurement) {
   }
 }
 
-TEST_F(StartOfRecording, TwoRunsAreTheSameToTheBit) {
+// To the bit only from one process to the next: sums are taken in another order where memory lies
+// otherwise.
+TEST_F(StartOfRecording, TwoRunsAreTheSame) {
   std::vector<Rigid3> first;
   for (std::size_t k = 0; k < 40; ++k) first.push_back(Show(k)->world_from_camera);
   Begin(TrackerOptions());
   for (std::size_t k = 0; k < 40; ++k) {
-    EXPECT_EQ(Show(k)->world_from_camera.translation, first[k].translation) << k;
+    const Eigen::Vector3d apart = Show(k)->world_from_camera.translation - first[k].translation;
+    EXPECT_LT(apart.norm(), 1e-9) << k;
   }
 }
 
