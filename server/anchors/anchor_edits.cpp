@@ -61,13 +61,7 @@ absl::Status AnchorManager::Place(const AnnotationTarget& target,
   place.distance_m = resolved->distance_m;
   place.seed = resolved->feature;
   place.seed_is_target = resolved->feature_is_target;
-  place.on_outline = resolved->view && resolved->view->on_outline;
-  if (resolved->view && !resolved->view->looked) {
-    const ResolvedTarget::View& view = *resolved->view;
-    const Eigen::Vector3d origin = view.world_from_camera.translation;
-    place.look = {view.past, view.pixel, origin, (place.point - origin).normalized()};
-  }
-  if (!place.seed && resolved->view && seed_ && !place.on_outline) {
+  if (!place.seed && resolved->view && seed_) {
     const ResolvedTarget::View& view = *resolved->view;
     // The feature is to find the depth by itself: neighbours only tell it where to begin.
     const double sigma_m = std::clamp(3.0 * view.depth_sigma_m, 0.1 * view.depth_m,

@@ -6,7 +6,6 @@
 
 #include "server/anchors/anchor_state.hpp"
 #include "server/anchors/edit_checks.hpp"
-#include "server/anchors/second_look.hpp"
 
 namespace saccade {
 namespace {
@@ -101,14 +100,11 @@ std::optional<AnchorMoved> AnchorManager::ResolveOne(bool map_corrected, AnchorR
 std::vector<AnchorMoved> AnchorManager::Resolve(std::shared_ptr<const MapSnapshot> snapshot,
                                                 const CameraModel& camera) {
   const bool corrected = newest_ && newest_->snapshot().map_revision != snapshot->map_revision;
-  scale_.Observe(*snapshot, camera.RadiansPerPixel());
-  newest_ = std::make_shared<const MapView>(std::move(snapshot), &scale_);
+  newest_ = std::make_shared<const MapView>(std::move(snapshot));
   camera_ = camera;
   std::vector<AnchorMoved> moved;
   int selections_left = kSelectionsPerFrame;
-  bool looked = false;
   for (AnchorRecord& record : records_) {
-    if (!looked) looked = LookAgain(frames_, newest_->snapshot(), record.place);
     if (std::optional<AnchorMoved> jump = ResolveOne(corrected, record, selections_left)) {
       moved.push_back(std::move(*jump));
     }

@@ -117,7 +117,6 @@ class AnchorManager {
   AnchorOptions options_;
   FrameLookup frames_;
   SeedFeatureFunction seed_;
-  ScaleChain scale_;
   std::shared_ptr<const MapView> newest_;  // null before the first Resolve
   std::optional<CameraModel> camera_;
   std::vector<AnchorRecord> records_;  // oldest first

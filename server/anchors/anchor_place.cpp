@@ -16,7 +16,6 @@ constexpr std::uint32_t kMinMatches = 3;           // before a seeded feature sa
 constexpr std::uint32_t kManyMatches = 20;         // before it may overrule the click's own depth
 constexpr Timestamp kSeedGraceNs = 1'000'000'000;  // a seeded feature is in the map by then
 constexpr double kConsistentChi2 = 16.0;
-constexpr double kSeenBy_s = 4.0;  // an outline that can be seen has been by then
 
 struct Candidate {
   const FeatureSnapshot* feature = nullptr;
@@ -88,10 +87,6 @@ void ChangeBinding(const Rigid3& new_from_old, AnchorPlace& place) {
   place.clicked_covariance = (r * place.clicked_covariance * r.transpose()).eval();
   if (place.seed_covariance) {
     place.seed_covariance = (r * *place.seed_covariance * r.transpose()).eval();
-  }
-  if (place.look) {
-    place.look->origin = new_from_old * place.look->origin;
-    place.look->ray = r * place.look->ray;
   }
 }
 
@@ -209,11 +204,7 @@ PlaceEstimate WithSeed(const MapView& map, const FeatureSnapshot& seed, PlaceEst
   if (!place.seed_is_target && !consistent && !mature) return estimate;
   if (!gain.allFinite()) return estimate;
   estimate.point_in_world += world_from_camera * gain * difference;
-  // While nobody has seen whether the click is on an outline, its patch may be half one thing, half
-  // another: it moves the mark, but vouches for nothing.
-  const bool unseen =
-      place.look && Seconds(map.snapshot().capture_time_ns - place.placed_ns) < kSeenBy_s;
-  const bool better = !unseen && seed.covariance_in_camera.trace() < prior.trace();
+  const bool better = seed.covariance_in_camera.trace() < prior.trace();
   if (better || place.seed_is_target || !consistent) {
     estimate.covariance_in_camera = seed.covariance_in_camera;
     estimate.covariance_in_world = seed.covariance_in_world;
@@ -222,23 +213,6 @@ PlaceEstimate WithSeed(const MapView& map, const FeatureSnapshot& seed, PlaceEst
     place.seed_covariance = turn * seed.covariance_in_camera * turn.transpose();
   }
   return estimate;
-}
-
-/// All of one part of the map may be too near or too far by one factor: nothing in that part, nor
-/// how well it fits, tells.
-void AddScale(const MapView& map, const AnchorPlace& place, PlaceEstimate& estimate) {
-  double total = 0, variance = 0;
-  for (const ClusterMember& member : place.members) {
-    total += member.weight;
-    variance += member.weight * map.ScaleVariance(member.id);
-  }
-  if (!(total > 0)) return;
-  const Rigid3& world_from_camera = map.snapshot().world_from_camera;
-  const Eigen::Vector3d line = estimate.point_in_world - world_from_camera.translation;
-  const Eigen::Vector3d in_camera = world_from_camera.rotation.conjugate() * line;
-  estimate.scale_sigma_m = std::sqrt(variance / total) * line.norm();
-  estimate.covariance_in_world += variance / total * line * line.transpose();
-  estimate.covariance_in_camera += variance / total * in_camera * in_camera.transpose();
 }
 
 /// The map dropped the seeded feature: what it taught stays, certainty too.
@@ -251,8 +225,7 @@ void ForgetSeed(AnchorPlace& place) {
 
 }  // namespace
 
-MapView::MapView(std::shared_ptr<const MapSnapshot> snapshot, const ScaleChain* scale)
-    : snapshot_(std::move(snapshot)), scale_(scale) {
+MapView::MapView(std::shared_ptr<const MapSnapshot> snapshot) : snapshot_(std::move(snapshot)) {
   by_id_.reserve(snapshot_->features.size());
   for (const FeatureSnapshot& feature : snapshot_->features) {
     const double check = feature.point_in_world.sum() + feature.covariance_in_world.sum() +
@@ -304,7 +277,6 @@ PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPla
   const Eigen::Vector3d lag_in_camera = map.snapshot().world_from_camera.rotation.conjugate() * lag;
   estimate.covariance_in_world += lag * lag.transpose();
   estimate.covariance_in_camera += lag_in_camera * lag_in_camera.transpose();
-  AddScale(map, place, estimate);
   return estimate;
 }
 

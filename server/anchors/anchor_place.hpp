@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "server/anchors/anchor_options.hpp"
-#include "server/anchors/frame_ring.hpp"
-#include "server/anchors/scale_chain.hpp"
 #include "shared/geometry/rigid3.hpp"
 #include "shared/scene/annotation.hpp"
 #include "shared/scene/map_snapshot.hpp"
@@ -20,17 +18,13 @@ namespace saccade {
 /// A snapshot whose features are found by id in constant time; made once per frame.
 class MapView {
  public:
-  /// `scale`: how surely its parts have one scale; null: surely. Outlives the view.
-  explicit MapView(std::shared_ptr<const MapSnapshot> snapshot, const ScaleChain* scale = nullptr);
+  explicit MapView(std::shared_ptr<const MapSnapshot> snapshot);
   const MapSnapshot& snapshot() const { return *snapshot_; }
   /// Null if the map does not hold it (any more).
   const FeatureSnapshot* Find(FeatureId id) const;
-  /// Variance of the logarithm of the scale around a feature.
-  double ScaleVariance(FeatureId id) const { return scale_ ? scale_->Of(id) : 0.0; }
 
  private:
   std::shared_ptr<const MapSnapshot> snapshot_;
-  const ScaleChain* scale_;
   absl::flat_hash_map<FeatureId, const FeatureSnapshot*> by_id_;
 };
 
@@ -40,15 +34,6 @@ struct ClusterMember {
   double weight = 1.0;                                      // 1 / (sigma^2 (dist^2 + softening^2))
   Eigen::Vector3d at_binding = Eigen::Vector3d::Zero();     // in binding [m]
   Eigen::Vector3d last_in_world = Eigen::Vector3d::Zero();  // in the frame before [m]
-};
-
-/// The picture that was clicked, for looking again at what it shows.
-struct ClickLook {
-  PastFrame past;
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // its camera, in binding [m]
-  Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();    // unit, in binding
-  double next_s = 0;                                 // after the click
 };
 
 /// How an anchor hangs in the map. `binding` is the world frame as the map had it when the anchor
@@ -69,8 +54,6 @@ struct AnchorPlace {
   std::optional<FeatureId> seed;  // feature at the very pixel; refines the point as it converges
   bool seed_seen = false;         // a new one is in the map from the next frame on
   bool seed_is_target = false;    // the feature itself was chosen
-  std::optional<ClickLook> look;  // until it is known whether the click is on an outline
-  bool on_outline = false;        // it is: in front and behind are different surfaces
 
   Rigid3 world_from_binding;
   /// The seeded feature's own covariance while it was the better witness, in binding [m^2].
@@ -89,7 +72,6 @@ struct PlaceEstimate {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
   Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // [m^2]
   Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // camera pose included [m^2]
-  double scale_sigma_m = 0;  // of it, by the scale of that part of the map
 };
 
 /// Carries `place` to this frame: fits the members' motion, replaces those that the map dropped

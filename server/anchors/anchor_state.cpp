@@ -108,11 +108,7 @@ std::string TrackerTrouble(TrackingStatus status) {
 }
 
 /// What makes an anchor's depth better known; where nothing can, that it has to be placed again.
-std::string Remedy(const AnchorPlace& place, const PlaceEstimate& estimate, double error_m) {
-  if (place.on_outline) return "it is on an outline; place it again beside it";
-  if (estimate.scale_sigma_m > 0.7 * error_m) {
-    return "its distance is not sure; turn slowly between here and where the map began";
-  }
+std::string Remedy(const AnchorPlace& place) {
   const bool guessed = place.method == AnchorMethod::kMedianDepth && !place.seed;
   if (place.was_tracking) return "look at it from nearby";
   return guessed ? "its depth is a guess; place it again on something that the map has"
@@ -120,7 +116,7 @@ std::string Remedy(const AnchorPlace& place, const PlaceEstimate& estimate, doub
 }
 
 std::string PausedReason(const MapSnapshot& snapshot, const Excess& metres, const Excess& pixels,
-                         const AnchorPlace& place, const PlaceEstimate& estimate) {
+                         const AnchorPlace& place) {
   if (!metres.above && !pixels.above) {
     const bool by_metres = metres.error * pixels.limit >= pixels.error * metres.limit;
     return absl::StrCat(
@@ -135,15 +131,15 @@ std::string PausedReason(const MapSnapshot& snapshot, const Excess& metres, cons
   return absl::StrCat(
       "expected error ",
       metres.above ? Compare(metres, snapshot, place) : Compare(pixels.error, pixels.limit, "px"),
-      ": ", Remedy(place, estimate, metres.error));
+      ": ", Remedy(place));
 }
 
 std::string ProvisionalReason(double relative, const AnchorOptions& options,
-                              const AnchorPlace& place, const PlaceEstimate& estimate) {
+                              const AnchorPlace& place) {
   if (!HasNearMember(place)) return "no mapped feature is near it yet: look around there";
   if (relative < options.tracking_sigma) return "";
   return absl::StrCat("its depth is known to ", absl::StrFormat("%.0f %%: ", 1e2 * relative),
-                      Remedy(place, estimate, relative * place.distance_m));
+                      Remedy(place));
 }
 
 }  // namespace
@@ -173,10 +169,10 @@ Anchor DescribeAnchor(const MapView& map, const CameraModel& camera, const Ancho
     anchor.reason = trouble;
   } else if (place.paused) {  // new ones, too: who is above the limit is not to be trusted
     anchor.state = AnchorState::kPaused;
-    anchor.reason = PausedReason(snapshot, metres, pixels, place, estimate);
+    anchor.reason = PausedReason(snapshot, metres, pixels, place);
   } else if (!place.was_tracking) {
     anchor.state = AnchorState::kProvisional;
-    anchor.reason = ProvisionalReason(relative, options, place, estimate);
+    anchor.reason = ProvisionalReason(relative, options, place);
   } else {
     anchor.state = AnchorState::kTracking;
   }

@@ -11,7 +11,6 @@
 #include "server/anchors/depth_probe.hpp"
 #include "server/anchors/local_surface.hpp"
 #include "server/anchors/rigid_fit.hpp"
-#include "server/anchors/second_look.hpp"
 
 namespace saccade {
 namespace {
@@ -19,8 +18,6 @@ namespace {
 constexpr double kMaxCoordinateM = 1e5;         // of points and rays that callers give
 constexpr double kRayRadiansPerPx = 1.0 / 500;  // a ray has no camera: an ordinary one is assumed
 constexpr double kPointSigmaM = 0.001;  // a point given in world is exact; what is drawn is not
-constexpr double kPatchHalf_px = 7.0;   // of ProbeDepth
-constexpr double kOtherShare = 0.3;     // that the other of two depths was meant
 constexpr double kFailedTrust = 0.3;    // searched for and not found: perhaps hidden
 
 std::string DescribeStatus(const MapSnapshot& snapshot) {
@@ -119,31 +116,14 @@ Rigid3 RayFromWorld(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray_in
   return world_from_ray.Inverse();
 }
 
-/// The picture's own word on the depth. Where it contradicts the neighbours it wins, for they may
-/// lie on what is behind; but then two depths are seen about the click, and unless the picture
-/// shows one surface on all sides of it, either may be meant.
-std::optional<DepthLayers> AskThePicture(const PastFrame& past, const Eigen::Vector2d& pixel,
-                                         FrameId newest, const FrameLookup& frames,
-                                         SurfaceDepth& depth) {
-  const auto layers = ProbeLayers(past, pixel, depth.depth_m, newest, frames);
-  if (layers && layers->on_outline()) {  // a feature there is half one thing, half the other
-    depth.depth_m = layers->nearer_m();
-    depth.sigma_m = OutlineSigma(*layers);
-    depth.at_feature.reset();
-    return layers;
-  }
-  if (depth.at_feature) return layers;
-  auto probed = ProbeDepth(past, pixel, depth.depth_m, newest, frames);
-  if (!probed) return layers;
-  // Of relief within the patch it tells no more than the mean.
-  const double relief = kPatchHalf_px * past.frame->camera->RadiansPerPixel() * probed->range_m;
-  probed->sigma_m = std::hypot(probed->sigma_m, relief);
-  const double neighbours_m = depth.depth_m, neighbours_sigma_m = depth.sigma_m;
+/// The picture's own word on the depth. Where it contradicts the neighbours it wins: they may lie
+/// on what is behind.
+void AskThePicture(const PastFrame& past, const Eigen::Vector2d& pixel, FrameId newest,
+                   const FrameLookup& frames, SurfaceDepth& depth) {
+  const auto probed = ProbeDepth(past, pixel, depth.depth_m, newest, frames);
+  if (!probed) return;
   JoinDepth(*probed, depth.depth_m, depth.sigma_m);
-  const double apart = std::abs(probed->range_m - neighbours_m);
-  const bool contradicts = apart > std::hypot(probed->sigma_m, neighbours_sigma_m);
-  if (contradicts && !layers) depth.sigma_m = std::hypot(depth.sigma_m, kOtherShare * apart);
-  return layers;
+  depth.at_feature.reset();
 }
 
 absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const FrameLookup& frames,
@@ -174,8 +154,9 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
   std::optional<SurfaceDepth> depth =
       EstimateDepth(samples, camera.RadiansPerPixel(), newest.snapshot().metric, options);
   if (!depth) return NoDepth();
-  const auto layers =
-      AskThePicture(*past, target.pixel, newest.snapshot().frame_id, frames, *depth);
+  if (!depth->at_feature) {
+    AskThePicture(*past, target.pixel, newest.snapshot().frame_id, frames, *depth);
+  }
 
   ResolvedTarget resolved;
   resolved.method = depth->method;
@@ -191,14 +172,10 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
   if (depth->at_feature && newest.Find(ids[*depth->at_feature])) {
     resolved.feature = ids[*depth->at_feature];
   }
-  resolved.view = ResolvedTarget::View{*std::move(past),
-                                       world_from_camera,
-                                       target.pixel,
-                                       depth->depth_m,
-                                       depth->sigma_m,
-                                       ray_from_world.rotation.conjugate() * depth->normal_in_ray,
-                                       layers && layers->on_outline(),
-                                       layers.has_value()};
+  resolved.view = ResolvedTarget::View{
+      *std::move(past), world_from_camera,
+      target.pixel,     depth->depth_m,
+      depth->sigma_m,   ray_from_world.rotation.conjugate() * depth->normal_in_ray};
   return resolved;
 }
 

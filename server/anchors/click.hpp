@@ -29,8 +29,6 @@ struct ResolvedTarget {
     double depth_m = 0;  // along the ray, from the camera's centre
     double depth_sigma_m = 0;
     Eigen::Vector3d normal_in_world = Eigen::Vector3d::Zero();  // of the surface, unit
-    bool on_outline = false;  // two surfaces meet in the picture there
-    bool looked = false;      // whether they do is known
   };
   std::optional<View> view;
 };

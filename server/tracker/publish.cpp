@@ -6,16 +6,16 @@ namespace {
 
 constexpr double kDepthKnown = 0.1;  // sigma / depth
 
-}  // namespace
-
-/// Only the pose is uncertain.
-Eigen::Matrix3d Tracker::Impl::KnownInCamera(const Eigen::Vector3d& point) const {
-  const Rigid3 camera_from_world = filter_.camera().world_from_camera.Inverse();
+/// Covariance of a fixed point in the camera frame: only the pose is uncertain.
+Eigen::Matrix3d KnownInCamera(const FilterState& filter, const Eigen::Vector3d& point) {
+  const Rigid3 camera_from_world = filter.camera().world_from_camera.Inverse();
   Eigen::Matrix<double, 3, 6> by_pose;
   by_pose.leftCols<3>() = -camera_from_world.RotationMatrix();
   by_pose.rightCols<3>() = Skew(camera_from_world * point);
-  return by_pose * filter_.PoseCovariance() * by_pose.transpose();
+  return by_pose * filter.PoseCovariance() * by_pose.transpose();
 }
+
+}  // namespace
 
 std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
                                                           const StageTimes& times) const {
@@ -47,7 +47,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
     feature.matched_count = landmark.matched;
     if (landmark.known) {
       feature.point_in_world = landmark.known->point_in_world;
-      feature.covariance_in_camera = KnownInCamera(feature.point_in_world);
+      feature.covariance_in_camera = KnownInCamera(filter_, feature.point_in_world);
       feature.depth_known = true;
     } else {
       const FeatureMarginal marginal = filter_.Marginal(landmark.id);

@@ -74,8 +74,6 @@ class Tracker::Impl {
   void CloseLoops(const Frame& frame);
   void RestTorn(const MapCorrection& correction);
   void MoveMap(const MapCorrection& correction);
-  /// Covariance of a fixed point in the camera frame [m^2].
-  Eigen::Matrix3d KnownInCamera(const Eigen::Vector3d& point) const;
   void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
   bool Settled() const;
