@@ -64,8 +64,8 @@ struct StartSolution {
   Eigen::MatrixXd covariance;
 };
 
-/// Structure and motion at once, from two first guesses: the given one, and one that takes nothing
-/// but the given rotations for true. The better one is answered. Some 50 ms; `stop` ends it early.
+/// Structure and motion at once, from three first guesses: the given one, one that only turns, and
+/// the better of the two reversed. The better one is answered. Some 50 ms; `stop` ends it early.
 /// Nothing: stopped, too little to solve, or no solution.
 std::optional<StartSolution> SolveStart(const StartProblem& problem, const std::atomic<bool>& stop);
 
