@@ -7,8 +7,9 @@ import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { Expert } from './expert.mjs';
 import { frozenPicture } from './freeze.mjs';
+import { displacement } from './outline.mjs';
 import { cubePixels, inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
-import { decodePng, mean, median, pixelsOf, psnr } from './pictures.mjs';
+import { decodePng, median, pixelsOf, psnr } from './pictures.mjs';
 import { renderTruth, startServer, Truth } from './server.mjs';
 
 const ACCENT = [0xc4, 0xb0, 0xff]; // the selected mark
@@ -268,7 +269,7 @@ async function findInMap(expert, frame, names) {
   return undefined;
 }
 
-/** The selected cube, found by its pixels, against where truth puts it in that very frame. */
+/** The selected cube, found by its lines, against where truth puts it in that very frame. */
 async function drawnCubes(context) {
   const { expert, check, placed } = context;
   await expert.enlarge('video');
@@ -293,9 +294,9 @@ async function drawnCubes(context) {
   }
   await shot(context, 'cubes');
   check(
-    // What the click itself was off is in it: 1 % of the depth is 4 px and more, seen from elsewhere.
-    'drawn cubes within 10 px of what was clicked',
-    errors.length >= 5 && median(errors) < 10,
+    // What the click itself was off is in it: at an outline 4 % of the depth, 5 px seen from elsewhere.
+    'drawn cubes within 2 px of what was clicked',
+    errors.length >= 5 && median(errors) < 2,
     `${errors.length} sightings, median ${median(errors)?.toFixed(2)} px, worst ${Math.max(...errors).toFixed(2)} px`,
   );
 }
@@ -311,8 +312,8 @@ async function cubeError({ expert, truth, camera }, { point }) {
     ((x + 0.5) / ratio - left) / scale - 0.5,
     ((y + 0.5) / ratio - top) / scale - 0.5,
   ]);
-  if (found.length < 20) return undefined; // out of view, or tracking was lost in that frame
-  return length(minus(mean(found), mean(wanted)));
+  const moved = displacement(wanted, found);
+  return moved && length(moved);
 }
 
 /** How many marks the page lists, once that number has stood for two seconds: edits may be on their way. */

@@ -16,6 +16,15 @@ export function psnr(a, b) {
   return mean === 0 ? Infinity : 10 * Math.log10(255 ** 2 / mean);
 }
 
+/** The same picture in grey (Rec. 601), in all three colours. */
+export function greyOf({ width, height, data }) {
+  const grey = new Float32Array(data.length);
+  for (let i = 0; i < data.length; i += 4) {
+    grey.fill(0.299 * data[i] + 0.587 * data[i + 1] + 0.114 * data[i + 2], i, i + 3);
+  }
+  return { width, height, data: grey };
+}
+
 /** Coordinates of the pixels within `tolerance` of a colour and opaque. */
 export function pixelsOf({ width, data }, [r, g, b], tolerance) {
   const out = [];
