@@ -106,8 +106,8 @@ std::optional<Eigen::Vector2d> MapKeeper::CornerNear(const ImagePyramid& pyramid
 
 std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
                                           const DepthGuess& depth, AnchorPoseId anchor,
-                                          const FrameMatcher& matcher, FilterState& filter,
-                                          LandmarkMap& map) {
+                                          const CameraMotion& motion, const FrameMatcher& matcher,
+                                          FilterState& filter, LandmarkMap& map) {
   auto patch = CutPatch(frame.grey, pixel, frame.camera);
   Eigen::Matrix<double, 3, 2> d_bearing;
   const auto bearing = frame.camera->Unproject(pixel, &d_bearing);
@@ -117,10 +117,14 @@ std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vecto
   const double sigma = matcher.PixelSigma(*frame.camera, pixel);
   FeatureBirth birth;
   birth.id = map.NextId();
-  // As seen in mid-exposure: the row's own pose is turned by `late` from the clone's.
+  // As seen in mid-exposure: the row's own pose is `late` from the clone's.
   const double late =
       filter.readout_s() * (std::clamp((pixel.y() + 0.5) / frame.camera->height(), 0.0, 1.0) - 0.5);
-  birth.bearing = ExpQuaternion(filter.WholeMotion().angular_velocity_rad_s * late) * *bearing;
+  const Eigen::Vector3d gone =
+      filter.camera().world_from_camera.rotation.conjugate() * motion.velocity_m_s * late;
+  birth.bearing =
+      (ExpQuaternion(motion.angular_velocity_rad_s * late) * *bearing + depth.inverse_range * gone)
+          .normalized();
   birth.bearing_covariance = sigma * sigma * d_bearing * d_bearing.transpose();
   birth.inverse_range = depth.inverse_range;
   birth.inverse_range_sigma = depth.inverse_range_sigma;
@@ -152,7 +156,8 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
   int planted = 0;
   for (const Corner& corner : corners_) {
     if (planted >= wanted) break;
-    planted += Plant(frame, corner.pixel, depth, anchor, matcher, filter, map) ? 1 : 0;
+    planted +=
+        Plant(frame, corner.pixel, depth, anchor, matches.motion, matcher, filter, map) ? 1 : 0;
   }
   filter.Remove({});  // a clone that nothing was planted in goes again
   return planted;
