@@ -13,9 +13,10 @@ CornerOptions MakeCornerOptions(const TrackerOptions& options) {
   return corner;
 }
 
-constexpr int kDepthFeatures = 8;        // needed to guess the depth of a new one
-constexpr int kFramesBetweenGrowth = 5;  // unless the view is nearly empty
-constexpr std::uint32_t kProbation = 8;  // attempts that a woken landmark has
+constexpr int kDepthFeatures = 8;          // needed to guess the depth of a new one
+constexpr int kFramesBetweenGrowth = 5;    // unless the view is nearly empty
+constexpr double kBetweenGrowth_s = 0.16;  // where frames take longer
+constexpr std::uint32_t kProbation = 8;    // attempts that a woken landmark has
 
 }  // namespace
 
@@ -91,7 +92,9 @@ bool MapKeeper::Wants(const FrameMatches& matches) const {
   const int missing = Missing(matches);
   if (missing <= 0) return false;
   if (missing > options_.features_in_view / 2) return true;
-  return missing >= options_.features_in_view / 8 && frames_since_growth_ >= kFramesBetweenGrowth;
+  const bool due = frames_since_growth_ >= kFramesBetweenGrowth ||
+                   Seconds(now_ns_ - grown_ns_) >= kBetweenGrowth_s;
+  return missing >= options_.features_in_view / 8 && due;
 }
 
 std::optional<Eigen::Vector2d> MapKeeper::CornerNear(const ImagePyramid& pyramid,
@@ -140,6 +143,7 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
                     const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
                     FilterState& filter, LandmarkMap& map, std::mt19937_64& random) {
   ++frames_since_growth_;
+  now_ns_ = frame.capture_time_ns;
   if (!everywhere && !Wants(matches)) return 0;
   std::vector<Eigen::Vector2d> occupied;
   for (const LandmarkMatch& match : matches.in_view) occupied.push_back(match.pixel);
@@ -147,6 +151,7 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
   detector_.DetectAll(pyramid, occupied, 3 * wanted, corners_);
   if (corners_.empty()) return 0;
   frames_since_growth_ = 0;
+  grown_ns_ = now_ns_;
   // The best third for sure, the rest by chance among what is left: strong corners come in heaps.
   const int fixed = std::min<int>(wanted / 3, static_cast<int>(corners_.size()));
   for (std::size_t k = corners_.size(); k > static_cast<std::size_t>(fixed) + 1; --k) {

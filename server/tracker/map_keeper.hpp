@@ -64,6 +64,7 @@ class MapKeeper {
   CornerDetector detector_;
   std::vector<Corner> corners_;
   int frames_since_growth_ = 1000;
+  Timestamp grown_ns_ = 0, now_ns_ = 0;  // the newest growth, and the newest frame
 };
 
 }  // namespace saccade

@@ -334,14 +334,14 @@ void Tracker::Impl::Manage(const Frame& frame) {
     return;
   }
   MoveHome();
-  if (refiner_.Finish(frames_, depth_.inverse_range, filter_)) ++revision_;
+  if (refiner_.Finish(frames_, frame.capture_time_ns, depth_.inverse_range, filter_)) ++revision_;
   times_.waited_ms = refiner_.waited_ms();
   if (!telling || covered) return;
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
                random_);
   Remember(*frame.camera);
-  refiner_.Start(frames_, filter_);
+  refiner_.Start(frames_, frame.capture_time_ns, filter_);
   KeepKeyframe(frame);
   CloseLoops(frame);
 }
