@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kBorder_px = 6.0;       // half a patch: nearer to the edge nothing can be compared
 constexpr double kWidest_px = 30.0;      // sigma of the widest ellipse that is searched
+constexpr int kFewestForMotion = 6;      // matches: fewer may agree on any
 constexpr double kUncertain_rad = 0.03;  // of the camera's direction, before a frame is searched
 
 SearchOptions MakeSearchOptions(const TrackerOptions& options) {
@@ -90,6 +91,17 @@ void HeedGroups(const CameraModel& camera, const FilterState& filter, const Land
   for (std::size_t k = 0; k < judged.size(); ++k) {
     if (!agrees[k]) judged[k]->weight = 0.0;
   }
+}
+
+/// Rows are exposed one after the other: what is seen in row v is seen `late` read-outs after
+/// mid-exposure, from a camera that has moved on with the present velocities.
+void BookRow(const CameraModel& camera, const CameraMotion& motion, double readout_s, double row,
+             LandmarkMatch& match) {
+  Eigen::Matrix<double, 6, 1> velocities;
+  velocities << motion.velocity_m_s, motion.angular_velocity_rad_s;
+  const double late = std::clamp((row + 0.5) / camera.height(), 0.0, 1.0) - 0.5;
+  match.d_readout = match.predicted.at.d_camera * velocities * late;
+  match.row_shift = match.d_readout * readout_s;
 }
 
 /// Of the ellipse that PatchSearcher looks at [px^2].
@@ -203,17 +215,7 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   match.found = match.hidden = false;
   match.weight = 0.0;
   if (!expected || !camera.InImage(expected->pixel, kBorder_px)) return;
-  // Rows are exposed one after the other: what is seen in row v is seen `late` read-outs after
-  // mid-exposure, from a camera that has moved on with the present velocities.
-  Eigen::Matrix<double, 6, 1> velocities;
-  velocities << motion.velocity_m_s, motion.angular_velocity_rad_s;
-  const Eigen::Vector2d flow = match.predicted.at.d_camera * velocities;
-  const auto book_row = [&](double row) {
-    const double late = std::clamp((row + 0.5) / camera.height(), 0.0, 1.0) - 0.5;
-    match.d_readout = flow * late;
-    match.row_shift = match.d_readout * readout_s;
-  };
-  book_row(expected->pixel.y());
+  BookRow(camera, motion, readout_s, expected->pixel.y(), match);
   match.pixel = expected->pixel + match.row_shift;
   const Eigen::Vector2d centre = match.pixel;
   const AnchoredPoint birth = FromBirth(landmark, match.point);
@@ -240,7 +242,7 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   match.searched = !match.hidden;
   if (!match.found) return;
   match.pixel = result.pixel;
-  book_row(result.pixel.y());
+  BookRow(camera, motion, readout_s, result.pixel.y(), match);
   match.noise = sigma * sigma * Eigen::Matrix2d::Identity() + result.covariance;
 }
 
@@ -266,6 +268,7 @@ RobustPose FrameMatcher::Solve(const CameraModel& camera, const PosePrior& prior
 void FrameMatcher::Renew(const CameraModel& camera, const FilterState& filter,
                          FrameMatches& matches, std::mt19937_64& random) const {
   const PosePrior prior{filter.camera().world_from_camera, filter.PoseCovariance()};
+  matches.motion = filter.WholeMotion();
   std::erase_if(matches.in_view, [&](LandmarkMatch& match) {
     const auto predicted = filter.Predicted(camera, match.id);
     if (!predicted) return true;
@@ -283,12 +286,21 @@ void FrameMatcher::Renew(const CameraModel& camera, const FilterState& filter,
   }
 }
 
+void FrameMatcher::CatchUp(const CameraModel& camera, const FilterState& filter,
+                           const MotionStep& step, FrameMatches& matches) {
+  if (matches.pose.inliers < kFewestForMotion) return;
+  matches.motion = PresentMotion(filter, matches.pose.world_from_camera, step);
+  for (LandmarkMatch& match : matches.in_view) {
+    if (match.found) BookRow(camera, matches.motion, filter.readout_s(), match.pixel.y(), match);
+  }
+}
+
 FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel& camera,
                                  const FilterState& filter, const LandmarkMap& map,
-                                 std::mt19937_64& random) {
+                                 const MotionStep& step, std::mt19937_64& random) {
   FrameMatches matches;
   const PosePrior prior{filter.camera().world_from_camera, filter.PoseCovariance()};
-  const CameraMotion motion = filter.WholeMotion();
+  matches.motion = filter.WholeMotion();
   matches.in_view = Visible(camera, filter, map);
   std::vector<LandmarkMatch>& in_view = matches.in_view;
   const std::vector<int> order = Order(camera, in_view, map, random);
@@ -296,11 +308,13 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
   const int first = std::min(options_.first_stage, total);
   int searched = 0;
   for (int k = 0; k < first; ++k) {
-    Search(pyramid, camera, map, prior, prior.world_from_camera, prior.covariance, motion,
+    Search(pyramid, camera, map, prior, prior.world_from_camera, prior.covariance, matches.motion,
            filter.readout_s(), in_view[order[k]]);
     searched += in_view[order[k]].searched ? 1 : 0;
   }
   matches.pose = Solve(camera, prior, in_view, random);
+  CatchUp(camera, filter, step, matches);
+  if (filter.readout_s() != 0.0) matches.pose = Solve(camera, prior, in_view, random);
   // Nothing to search is no surprise: widening would only make it harder to find.
   matches.surprised = searched >= 8 && matches.pose.inliers < std::max(4, searched / 3);
   const bool known = matches.pose.inliers >= 3;
@@ -309,9 +323,10 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
   for (int k = 0; k < total; ++k) {
     LandmarkMatch& match = in_view[order[k]];
     if (match.accepted() || (match.searched && !known)) continue;
-    Search(pyramid, camera, map, prior, pose, spread, motion, filter.readout_s(), match);
+    Search(pyramid, camera, map, prior, pose, spread, matches.motion, filter.readout_s(), match);
   }
   matches.pose = Solve(camera, prior, in_view, random);
+  CatchUp(camera, filter, step, matches);
   if (prior.covariance.diagonal().tail<3>().maxCoeff() > kUncertain_rad * kUncertain_rad) {
     HeedGroups(camera, filter, map, prior.covariance, matches);
   }

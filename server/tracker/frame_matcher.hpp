@@ -7,6 +7,7 @@
 #include "server/filter/filter_state.hpp"
 #include "server/filter/robust_pose.hpp"
 #include "server/map/landmark.hpp"
+#include "server/tracker/present_motion.hpp"
 #include "server/tracker/tracker_options.hpp"
 
 namespace saccade {
@@ -37,6 +38,7 @@ struct FrameMatches {
   int accepted = 0;
   int hidden = 0;
   double searched_px2 = 0;  // area of all ellipses that were searched
+  CameraMotion motion;      // when this picture was exposed
   bool surprised = false;   // few of the first stage agree: the camera moved unexpectedly
 };
 
@@ -46,9 +48,10 @@ class FrameMatcher {
  public:
   explicit FrameMatcher(const TrackerOptions& options);
 
-  /// `prior` is the filter's predicted pose; nothing but scratch memory changes.
+  /// `filter` has predicted `step`; nothing but scratch memory changes.
   FrameMatches Match(const ImagePyramid& pyramid, const CameraModel& camera,
-                     const FilterState& filter, const LandmarkMap& map, std::mt19937_64& random);
+                     const FilterState& filter, const LandmarkMap& map, const MotionStep& step,
+                     std::mt19937_64& random);
 
   /// The same matches against a filter that has changed since; nothing is searched anew.
   void Renew(const CameraModel& camera, const FilterState& filter, FrameMatches& matches,
@@ -66,6 +69,9 @@ class FrameMatcher {
   void Search(const ImagePyramid& pyramid, const CameraModel& camera, const LandmarkMap& map,
               const PosePrior& prior, const Rigid3& pose, const Matrix6d& pose_covariance,
               const CameraMotion& motion, double readout_s, LandmarkMatch& match);
+  /// The motion by the pose that was found, and with it where in mid-exposure the matches were.
+  static void CatchUp(const CameraModel& camera, const FilterState& filter, const MotionStep& step,
+                      FrameMatches& matches);
   RobustPose Solve(const CameraModel& camera, const PosePrior& prior,
                    std::vector<LandmarkMatch>& in_view, std::mt19937_64& random) const;
 

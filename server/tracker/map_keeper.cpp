@@ -13,9 +13,10 @@ CornerOptions MakeCornerOptions(const TrackerOptions& options) {
   return corner;
 }
 
-constexpr int kDepthFeatures = 8;        // needed to guess the depth of a new one
-constexpr int kFramesBetweenGrowth = 5;  // unless the view is nearly empty
-constexpr std::uint32_t kProbation = 8;  // attempts that a woken landmark has
+constexpr int kDepthFeatures = 8;          // needed to guess the depth of a new one
+constexpr int kFramesBetweenGrowth = 5;    // unless the view is nearly empty
+constexpr double kBetweenGrowth_s = 0.16;  // where frames take longer
+constexpr std::uint32_t kProbation = 8;    // attempts that a woken landmark has
 
 }  // namespace
 
@@ -91,7 +92,9 @@ bool MapKeeper::Wants(const FrameMatches& matches) const {
   const int missing = Missing(matches);
   if (missing <= 0) return false;
   if (missing > options_.features_in_view / 2) return true;
-  return missing >= options_.features_in_view / 8 && frames_since_growth_ >= kFramesBetweenGrowth;
+  const bool due = frames_since_growth_ >= kFramesBetweenGrowth ||
+                   Seconds(now_ns_ - grown_ns_) >= kBetweenGrowth_s;
+  return missing >= options_.features_in_view / 8 && due;
 }
 
 std::optional<Eigen::Vector2d> MapKeeper::CornerNear(const ImagePyramid& pyramid,
@@ -106,8 +109,8 @@ std::optional<Eigen::Vector2d> MapKeeper::CornerNear(const ImagePyramid& pyramid
 
 std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
                                           const DepthGuess& depth, AnchorPoseId anchor,
-                                          const FrameMatcher& matcher, FilterState& filter,
-                                          LandmarkMap& map) {
+                                          const CameraMotion& motion, const FrameMatcher& matcher,
+                                          FilterState& filter, LandmarkMap& map) {
   auto patch = CutPatch(frame.grey, pixel, frame.camera);
   Eigen::Matrix<double, 3, 2> d_bearing;
   const auto bearing = frame.camera->Unproject(pixel, &d_bearing);
@@ -117,10 +120,14 @@ std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vecto
   const double sigma = matcher.PixelSigma(*frame.camera, pixel);
   FeatureBirth birth;
   birth.id = map.NextId();
-  // As seen in mid-exposure: the row's own pose is turned by `late` from the clone's.
+  // As seen in mid-exposure: the row's own pose is `late` from the clone's.
   const double late =
       filter.readout_s() * (std::clamp((pixel.y() + 0.5) / frame.camera->height(), 0.0, 1.0) - 0.5);
-  birth.bearing = ExpQuaternion(filter.WholeMotion().angular_velocity_rad_s * late) * *bearing;
+  const Eigen::Vector3d gone =
+      filter.camera().world_from_camera.rotation.conjugate() * motion.velocity_m_s * late;
+  birth.bearing =
+      (ExpQuaternion(motion.angular_velocity_rad_s * late) * *bearing + depth.inverse_range * gone)
+          .normalized();
   birth.bearing_covariance = sigma * sigma * d_bearing * d_bearing.transpose();
   birth.inverse_range = depth.inverse_range;
   birth.inverse_range_sigma = depth.inverse_range_sigma;
@@ -136,6 +143,7 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
                     const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
                     FilterState& filter, LandmarkMap& map, std::mt19937_64& random) {
   ++frames_since_growth_;
+  now_ns_ = frame.capture_time_ns;
   if (!everywhere && !Wants(matches)) return 0;
   std::vector<Eigen::Vector2d> occupied;
   for (const LandmarkMatch& match : matches.in_view) occupied.push_back(match.pixel);
@@ -143,6 +151,7 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
   detector_.DetectAll(pyramid, occupied, 3 * wanted, corners_);
   if (corners_.empty()) return 0;
   frames_since_growth_ = 0;
+  grown_ns_ = now_ns_;
   // The best third for sure, the rest by chance among what is left: strong corners come in heaps.
   const int fixed = std::min<int>(wanted / 3, static_cast<int>(corners_.size()));
   for (std::size_t k = corners_.size(); k > static_cast<std::size_t>(fixed) + 1; --k) {
@@ -152,7 +161,8 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
   int planted = 0;
   for (const Corner& corner : corners_) {
     if (planted >= wanted) break;
-    planted += Plant(frame, corner.pixel, depth, anchor, matcher, filter, map) ? 1 : 0;
+    planted +=
+        Plant(frame, corner.pixel, depth, anchor, matches.motion, matcher, filter, map) ? 1 : 0;
   }
   filter.Remove({});  // a clone that nothing was planted in goes again
   return planted;

@@ -50,11 +50,12 @@ class MapKeeper {
   /// The best corner at most `radius_px` from `pixel`, if there is one: what can be tracked.
   std::optional<Eigen::Vector2d> CornerNear(const ImagePyramid& pyramid,
                                             const Eigen::Vector2d& pixel, int radius_px);
-  /// Starts one feature at a pixel; nothing if there is no texture or no room for a patch.
+  /// Starts one feature at a pixel, seen by a camera of these velocities; nothing if there is no
+  /// texture or no room for a patch.
   std::optional<FeatureId> Plant(const Frame& frame, const Eigen::Vector2d& pixel,
                                  const DepthGuess& depth, AnchorPoseId anchor,
-                                 const FrameMatcher& matcher, FilterState& filter,
-                                 LandmarkMap& map);
+                                 const CameraMotion& motion, const FrameMatcher& matcher,
+                                 FilterState& filter, LandmarkMap& map);
   /// True if Grow() would start features now.
   bool Wants(const FrameMatches& matches) const;
 
@@ -63,6 +64,7 @@ class MapKeeper {
   CornerDetector detector_;
   std::vector<Corner> corners_;
   int frames_since_growth_ = 1000;
+  Timestamp grown_ns_ = 0, now_ns_ = 0;  // the newest growth, and the newest frame
 };
 
 }  // namespace saccade

@@ -17,6 +17,19 @@ Eigen::Matrix3d KnownInCamera(const FilterState& filter, const Eigen::Vector3d& 
 
 }  // namespace
 
+Difficulties Tracker::Impl::SeeDifficulties() const {
+  constexpr int kFollowed = 8;            // matches...
+  constexpr double kFollowedShare = 0.3;  // ...and of the searches
+  Difficulties seen;
+  seen.waits_for_target = !started_ && starter_.waits_for_target();
+  seen.turns_followed = started_ && !held_ && matches_.accepted >= kFollowed &&
+                        matches_.accepted >= kFollowedShare * matches_.attempted;
+  seen.speed_rad_s = filter_.WholeMotion().angular_velocity_rad_s.norm();
+  seen.in_view = matches_.accepted;
+  seen.too_few_hz = rate_.TooFew();
+  return seen;
+}
+
 std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
                                                           const StageTimes& times) const {
   auto snapshot = std::make_shared<MapSnapshot>();
@@ -25,8 +38,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
   snapshot->status = monitor_.status();
   snapshot->quality = monitor_.quality();
   const CameraMotion camera = filter_.WholeMotion();
-  snapshot->advice = AdviceFor(monitor_, !started_ && starter_.waits_for_target(),
-                               camera.angular_velocity_rad_s.norm(), matches_.accepted);
+  snapshot->advice = AdviceFor(monitor_, SeeDifficulties());
   snapshot->metric = metric_;
   snapshot->world_from_camera = camera.world_from_camera;
   snapshot->pose_covariance = filter_.PoseCovariance();

@@ -162,7 +162,8 @@ absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
   const double now = (pose.Inverse() * (world_from_camera * (clicked.bearing * range))).norm();
   const MapKeeper::DepthGuess depth{1.0 / now, depth_sigma_m / depth_prior_m / now};
   const AnchorPoseId anchor = filter_.AddAnchor();
-  const auto id = keeper_.Plant(last_frame_, seen.pixel, depth, anchor, matcher_, filter_, map_);
+  const auto id = keeper_.Plant(last_frame_, seen.pixel, depth, anchor, matches_.motion, matcher_,
+                                filter_, map_);
   filter_.Remove({});
   Remember(camera);
   if (!id) return absl::NotFoundError("feature: no texture to track at this pixel");

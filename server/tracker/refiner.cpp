@@ -10,7 +10,8 @@
 namespace saccade {
 namespace {
 
-constexpr double kKeyframeShare = 0.01;  // of the distance to what is in view
+constexpr double kLongestDelay_s = 0.055;  // for an adjustment, where frames take longer
+constexpr double kKeyframeShare = 0.01;    // of the distance to what is in view
 constexpr double kKeyframeAngle_rad = 0.03;
 // An adjustment that moves the camera by more is told to the experts as a jump.
 constexpr double kJumpShare = 0.02;
@@ -95,11 +96,12 @@ void Refiner::Take(const Rigid3& world_from_camera, double distance,
   for (const GraphBirth& birth : births) newest_feature_ = std::max(newest_feature_, birth.id);
 }
 
-void Refiner::Start(std::int64_t frame, FilterState& filter) {
+void Refiner::Start(std::int64_t frame, Timestamp time_ns, FilterState& filter) {
   if (!options_.adjust || !fresh_ || running_.valid()) return;
   auto job = graph_.MakeJob([&](FeatureId id) { return EstimateOf(filter, id); });
   if (!job) return;
   started_ = frame;
+  started_ns_ = time_ns;
   filter.Mark();
   running_ = std::async(std::launch::async, [this, job = *std::move(job)]() mutable {
     // Late is no loss, but pictures and heartbeats are: what is live comes first.
@@ -135,9 +137,12 @@ void Refiner::Wait() const {
   if (running_.valid()) running_.wait();
 }
 
-bool Refiner::Finish(std::int64_t frame, double inverse_range, FilterState& filter) {
+bool Refiner::Finish(std::int64_t frame, Timestamp time_ns, double inverse_range,
+                     FilterState& filter) {
   waited_ms_ = 0.0;
-  if (!running_.valid() || frame < started_ + options_.adjust_delay) return false;
+  const bool due = frame >= started_ + options_.adjust_delay ||
+                   Seconds(time_ns - started_ns_) >= kLongestDelay_s;
+  if (!running_.valid() || !due) return false;
   if (options_.adjust_live &&
       running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
     return false;

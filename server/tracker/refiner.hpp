@@ -11,6 +11,7 @@
 #include "server/map/place_graph.hpp"
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/tracker_options.hpp"
+#include "shared/time/timestamp.hpp"
 
 namespace saccade {
 
@@ -40,10 +41,10 @@ class Refiner {
   void Take(const Rigid3& world_from_camera, double distance, std::span<const GraphSighting> seen,
             std::span<const GraphBirth> births, std::optional<AnchorPoseId> clone);
   /// Starts an adjustment if there is something new and none is running.
-  void Start(std::int64_t frame, FilterState& filter);
+  void Start(std::int64_t frame, Timestamp time_ns, FilterState& filter);
   /// Puts a finished one into the filter. True: the camera jumped by it, seen against the distance
   /// to what is in view.
-  bool Finish(std::int64_t frame, double inverse_range, FilterState& filter);
+  bool Finish(std::int64_t frame, Timestamp time_ns, double inverse_range, FilterState& filter);
   /// What the keyframes know of a feature that has left the filter.
   std::optional<KeyframeGraph::Remembered> Remember(FeatureId id) const {
     return graph_.Remember(id);
@@ -73,6 +74,7 @@ class Refiner {
   std::atomic<bool> stop_ = false;
   std::future<std::optional<KeyframeGraph::Job>> running_;
   std::int64_t started_ = 0;  // frame
+  Timestamp started_ns_ = 0;
   double waited_ms_ = 0.0;
   bool fresh_ = false;  // the newest keyframe is the newest frame
 };

@@ -9,6 +9,9 @@ constexpr double kPositionShare = 0.05;  // of the distance to what is in view
 constexpr double kAngleSigma_rad = 0.05;
 constexpr double kVelocityShare_1_s = 0.3;
 constexpr double kAngularVelocitySigma_rad_s = 0.5;
+// Of the newest frame's searches, that a start must explain: good ones have 79 to 99 %. With 38 to
+// 74 % the map was up to 40 cm off (`hall_imu` at 10 pictures a second).
+constexpr double kAgreeing = 0.75;
 
 }  // namespace
 
@@ -18,6 +21,7 @@ void Tracker::Impl::SeekStart(const Frame& frame) {
   times_.waited_ms = finder_.waited_ms();
   if (found) {
     TakeOver(*found, frame);
+    if (matches_.accepted < kAgreeing * matches_.attempted) StartAnew(frame);
   } else {
     finder_.Start(frames_, filter_);
   }

@@ -21,14 +21,6 @@ constexpr double kLeastNoise = 0.5;      // of R: patches seen from elsewhere ar
 constexpr double kMargin = 4.5;          // half of chi squared: three sigmas
 constexpr int kFewestKnown = 12;         // points whose range is known
 constexpr double kLeastAgreeing = 0.8;   // of the sightings
-constexpr int kFramesOfBirth = 3;        // after which the motion at birth is told no more
-
-template <typename Sightings>
-auto FindSeen(Sightings& seen, FeatureId id) {
-  const auto at = std::lower_bound(seen.begin(), seen.end(), id,
-                                   [](const auto& each, FeatureId key) { return each.id < key; });
-  return at != seen.end() && at->id == id ? &*at : nullptr;
-}
 
 }  // namespace
 
@@ -85,6 +77,7 @@ void StartFinder::Record(Timestamp time_ns, const CameraModel& camera, const Fil
   }
   newest_feature_ = newest;
   shots_.push_back(std::move(shot));
+  TellRates();
   if (!running_.valid()) Thin();
 }
 
@@ -100,18 +93,6 @@ void StartFinder::Thin() {
   shots_ = std::move(kept);
 }
 
-StartRay StartFinder::CarriedBirth(const Seen& birth, std::size_t shot) const {
-  StartRay ray = birth.ray;
-  for (std::size_t k = shot + 1; k < std::min(shots_.size(), shot + 1 + kFramesOfBirth); ++k) {
-    const Seen* next = FindSeen(shots_[k].sightings, birth.id);
-    if (next == nullptr) continue;
-    const double dt = Seconds(shots_[k].time_ns - shots_[shot].time_ns);
-    ray.d_readout = -birth.d_bearing * ((next->pixel - birth.pixel) / dt * birth.late);
-    break;
-  }
-  return ray;
-}
-
 /// Against the oldest shot that shares enough with the newest: what one rotation leaves.
 bool StartFinder::ShowsParallax() const {
   const Shot& newest = shots_.back();
@@ -120,8 +101,8 @@ bool StartFinder::ShowsParallax() const {
     std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> pairs;
     double sigma_rad = 0.0;
     for (const Seen& seen : newest.sightings) {
-      const Seen* before = FindSeen(oldest.sightings, seen.id);
-      if (before == nullptr) before = FindSeen(oldest.births, seen.id);
+      const Seen* before = Find(oldest.sightings, seen.id);
+      if (before == nullptr) before = Find(oldest.births, seen.id);
       if (before == nullptr) continue;
       pairs.emplace_back(before->ray.ray, seen.ray.ray);
       sigma_rad += seen.ray.sigma_rad;
@@ -147,8 +128,8 @@ std::vector<std::size_t> StartFinder::ChooseShots() const {
   for (std::size_t k = 0; k + 1 < shots_.size(); ++k) {
     int shared = 0;
     for (const Seen& seen : newest.sightings) {
-      const bool both = FindSeen(shots_[k].sightings, seen.id) != nullptr ||
-                        FindSeen(shots_[k].births, seen.id) != nullptr;
+      const bool both = Find(shots_[k].sightings, seen.id) != nullptr ||
+                        Find(shots_[k].births, seen.id) != nullptr;
       shared += both ? 1 : 0;
     }
     if (shared >= kFewestShared) sharing.push_back(k);
@@ -182,7 +163,7 @@ StartFinder::Job StartFinder::MakeJob(const FilterState& filter) const {
       job.points.push_back(birth.id);
       StartPoint point;
       point.anchor = static_cast<int>(at);
-      point.seen = CarriedBirth(birth, job.shots[at]);
+      point.seen = birth.ray;
       const AnchoredPoint now = filter.Point(birth.id);
       point.bearing = point.seen.At(job.problem.readout_s);
       point.inverse_range = std::max(1e-3, now.inverse_range);

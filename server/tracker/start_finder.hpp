@@ -69,6 +69,7 @@ class StartFinder {
     Timestamp time_ns = 0;
     Rigid3 world_from_camera;             // by the filter
     std::vector<Seen> sightings, births;  // rising ids
+    Seen* Find(FeatureId id);             // in either
   };
   struct Job {
     StartProblem problem;
@@ -78,10 +79,12 @@ class StartFinder {
 
   static std::optional<Seen> See(const CameraModel& camera, FeatureId id,
                                  const Eigen::Vector2d& pixel, double sigma_px);
+  static const Seen* Find(const std::vector<Seen>& seen, FeatureId id);
   void Stop();
   void Thin();
-  /// Rays of births are carried by what the next frames saw: their own motion was not known yet.
-  StartRay CarriedBirth(const Seen& birth, std::size_t shot) const;
+  /// How fast what was seen moved in the picture, as soon as other frames tell it: by differences
+  /// of the newest three. At a birth and in the first frames nothing else knows it.
+  void TellRates();
   bool ShowsParallax() const;
   Job MakeJob(const FilterState& filter) const;
   std::vector<std::size_t> ChooseShots() const;

@@ -115,28 +115,4 @@ void StatusMonitor::Count(int attempted, int accepted, bool settled) {
   }
 }
 
-std::string AdviceFor(const StatusMonitor& monitor, bool waits_for_target, double speed_rad_s,
-                      int in_view) {
-  constexpr double kFast_rad_s = 1.5;
-  constexpr int kFew = 12;
-  switch (monitor.status()) {
-    case TrackingStatus::kInitialising:
-      return waits_for_target ? "Point the camera at the printed target."
-                              : "Move slowly sideways so that depth can be seen.";
-    case TrackingStatus::kLost:
-      return "Tracking is lost: look again at a place seen before.";
-    case TrackingStatus::kRelocalising:
-      return "Place recognised: hold still for a moment.";
-    case TrackingStatus::kCoasting:
-      if (monitor.suspended()) return "";
-      return "The view is covered, blurred or empty: uncover the lens or look at something with "
-             "texture.";
-    case TrackingStatus::kTracking:
-      break;
-  }
-  if (speed_rad_s > kFast_rad_s) return "Turn more slowly.";
-  if (in_view < kFew) return "Few marks in view: look at something with texture.";
-  return "";
-}
-
 }  // namespace saccade

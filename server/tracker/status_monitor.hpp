@@ -1,7 +1,6 @@
 #pragma once
 
 #include <deque>
-#include <string>
 
 #include "server/tracker/tracker_options.hpp"
 #include "shared/scene/map_snapshot.hpp"
@@ -58,9 +57,5 @@ class StatusMonitor {
   int confirmed_ = 0;
   bool refused_ = false;
 };
-
-/// What the wearer can do about it, in words; empty if all is well.
-std::string AdviceFor(const StatusMonitor& monitor, bool waits_for_target, double speed_rad_s,
-                      int in_view);
 
 }  // namespace saccade

@@ -109,6 +109,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
     return Publish(frame, times_);
   }
   repeated_ = 0;
+  if (has_frame_) rate_.Add(dt);
   if (gap) ResumeAfterGap();
   previous_mount_ = has_frame_ ? last_frame_.mount : std::nullopt;
   last_frame_ = frame;
@@ -141,7 +142,7 @@ void Tracker::Impl::Begin(const Frame& frame) {
   metric_ = start->metric;
   held_ = metric_ || !options_.start;
   depth_ = start->depth;
-  matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_, random_);
+  matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_, MotionStep(), random_);
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/true, matcher_, filter_, map_,
                random_);
   started_ = filter_.feature_count() > 0 || !map_.all().empty();
@@ -199,11 +200,11 @@ void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
     matches_ = FrameMatches();
     return;
   }
-  matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
+  matches_ = matcher_.Match(pyramid_, camera, filter_, map_, {dt, noise}, random_);
   if (matches_.surprised && followed) {
     filter_.Inflate(LineariseMotion(before, before.world_from_camera.rotation, dt, wild).q);
     const double searched_px2 = matches_.searched_px2;
-    matches_ = matcher_.Match(pyramid_, camera, filter_, map_, random_);
+    matches_ = matcher_.Match(pyramid_, camera, filter_, map_, {dt, noise}, random_);
     matches_.searched_px2 += searched_px2;
   }
   times_.search_ms = watch.Lap_ms();
@@ -240,6 +241,7 @@ void Tracker::Impl::Follow(const Frame& frame, double dt) {
   }
   Correct(*frame.camera);
   StopWatch watch;
+  rate_.Record(matches_.attempted, matches_.accepted, MovedPx(*frame.camera, dt));
   monitor_.Record(matches_.attempted, matches_.accepted, Settled());
   const bool confirmed = monitor_.status() == TrackingStatus::kTracking ||
                          monitor_.status() == TrackingStatus::kInitialising;
@@ -250,6 +252,14 @@ void Tracker::Impl::Follow(const Frame& frame, double dt) {
     Manage(frame);
   }
   times_.manage_ms = watch.Lap_ms() - times_.waited_ms;
+}
+
+/// How far things moved in the picture since the one before, about; nothing: too little was found.
+std::optional<double> Tracker::Impl::MovedPx(const CameraModel& camera, double dt) const {
+  if (matches_.accepted < options_.coasting_below) return std::nullopt;
+  const double rate = matches_.motion.angular_velocity_rad_s.norm() +
+                      matches_.motion.velocity_m_s.norm() * depth_.inverse_range;
+  return dt * rate * camera.intrinsics().fx;
 }
 
 /// The target leaves; what was seen of it in this frame stays as ordinary features, at the depth
@@ -264,8 +274,8 @@ void Tracker::Impl::KeepTargetPoints(const Frame& frame) {
     if (point == nullptr || !match.accepted()) continue;
     if (!anchor) anchor = filter_.AddAnchor();
     const double inverse = 1.0 / (camera_from_world * *point).norm();
-    keeper_.Plant(frame, match.pixel, {inverse, kDepthSigma * inverse}, *anchor, matcher_, filter_,
-                  map_);
+    keeper_.Plant(frame, match.pixel, {inverse, kDepthSigma * inverse}, *anchor, matches_.motion,
+                  matcher_, filter_, map_);
   }
   if (anchor) filter_.Remove({});  // a clone that nothing was planted in goes again
 }
@@ -324,14 +334,14 @@ void Tracker::Impl::Manage(const Frame& frame) {
     return;
   }
   MoveHome();
-  if (refiner_.Finish(frames_, depth_.inverse_range, filter_)) ++revision_;
+  if (refiner_.Finish(frames_, frame.capture_time_ns, depth_.inverse_range, filter_)) ++revision_;
   times_.waited_ms = refiner_.waited_ms();
   if (!telling || covered) return;
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
   keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
                random_);
   Remember(*frame.camera);
-  refiner_.Start(frames_, filter_);
+  refiner_.Start(frames_, frame.capture_time_ns, filter_);
   KeepKeyframe(frame);
   CloseLoops(frame);
 }

@@ -5,9 +5,11 @@
 
 #include "server/map/dormant_landmarks.hpp"
 #include "server/map/relocaliser.hpp"
+#include "server/tracker/advice.hpp"
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/loop_closer.hpp"
 #include "server/tracker/map_keeper.hpp"
+#include "server/tracker/picture_rate.hpp"
 #include "server/tracker/refiner.hpp"
 #include "server/tracker/start_finder.hpp"
 #include "server/tracker/starter.hpp"
@@ -81,6 +83,8 @@ class Tracker::Impl {
   void SeekStart(const Frame& frame);
   /// Filter, map and keyframes anew, from a start that holds; the camera from this frame's matches.
   void TakeOver(const FoundStart& start, const Frame& frame);
+  std::optional<double> MovedPx(const CameraModel& camera, double dt) const;
+  Difficulties SeeDifficulties() const;
   std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times) const;
 
   SourceInfo source_;
@@ -93,6 +97,7 @@ class Tracker::Impl {
   MapKeeper keeper_;
   Starter starter_;
   StatusMonitor monitor_;
+  PictureRate rate_;  // the source's: a new map changes nothing about it
   Relocaliser relocaliser_;
   Refiner refiner_;
   StartFinder finder_;

@@ -75,13 +75,5 @@ TEST(StatusMonitor, RelocalisationIsConfirmedByTheNextFramesOrRefused) {
   EXPECT_TRUE(bad.refused());
 }
 
-TEST(StatusMonitor, AdviceSaysWhatToDo) {
-  StatusMonitor monitor = Tracking();
-  EXPECT_EQ(AdviceFor(monitor, false, 0.1, 50), "");
-  EXPECT_NE(AdviceFor(monitor, false, 2.5, 50), "");
-  while (monitor.status() != TrackingStatus::kLost) monitor.Record(50, 0, true);
-  EXPECT_NE(AdviceFor(monitor, false, 0.1, 0), "");
-}
-
 }  // namespace
 }  // namespace saccade
