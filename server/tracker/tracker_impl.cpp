@@ -16,6 +16,8 @@ constexpr double kSettledDepth = 0.25;   // sigma / inverse range
 constexpr int kFewestToUpdate = 3;       // matches: fewer can agree by chance
 constexpr double kLooseTie_rad = 0.005;  // of what is in view to the clone that errors count from
 constexpr int kRepeats = 2;              // of a picture, as a source does that fills up its rate
+constexpr int kYoungMap = 60;            // frames tracked in it, before it is worth waiting for
+constexpr int kPatience = 30;            // frames lost, before a young map is given up
 constexpr double kSurprise = 3.0;        // times the motion noise, after an unexpected move
 
 bool SamePicture(const cv::Mat& a, const cv::Mat& b) {
@@ -80,7 +82,7 @@ void Tracker::Impl::Reset() {
   before_relocalisation_.reset();
   started_ = metric_ = held_ = has_frame_ = false;
   head_rate_rad_s_ = 0.0;
-  frames_ = frames_lost_ = 0;
+  frames_ = frames_lost_ = frames_tracked_ = 0;
   home_ = 1;
   ++generation_;
   ++revision_;
@@ -91,6 +93,11 @@ void Tracker::Impl::StartAnew(const Frame& frame) {
   last_frame_ = frame;
   has_frame_ = true;
   Begin(frame);
+}
+
+bool Tracker::Impl::Hopeless() const {
+  if (!held_) return true;
+  return !metric_ && frames_tracked_ < kYoungMap && frames_lost_ > kPatience;
 }
 
 std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
@@ -117,7 +124,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   has_frame_ = true;
   if (!started_) {
     Begin(frame);
-  } else if (monitor_.status() == TrackingStatus::kLost && !held_) {
+  } else if (monitor_.status() == TrackingStatus::kLost && Hopeless()) {
     StartAnew(frame);
   } else if (monitor_.status() == TrackingStatus::kLost) {
     refiner_.Drop(filter_);
@@ -126,6 +133,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
   } else {
     Follow(frame, dt);
   }
+  frames_tracked_ += monitor_.status() == TrackingStatus::kTracking ? 1 : 0;
   times_.total_ms = total.Lap_ms() - times_.waited_ms;
   return Publish(frame, times_);
 }

@@ -39,6 +39,8 @@ class Tracker::Impl {
   void Begin(const Frame& frame);
   /// Lost before there was a map that one could come back to.
   void StartAnew(const Frame& frame);
+  /// Lost, and the map was seen too shortly to be found again: another one is worth more.
+  bool Hopeless() const;
   void Follow(const Frame& frame, double dt);
   void Recover(const Frame& frame);
   /// Before the first frame after a gap in time (server/capture/gap.hpp): a map that can be
@@ -116,6 +118,7 @@ class Tracker::Impl {
   MapKeeper::DepthGuess depth_;
   std::int64_t frames_ = 0;  // since the start of this map
   std::int64_t frames_lost_ = 0;
+  std::int64_t frames_tracked_ = 0;  // of this map
   std::uint64_t revision_ = 0;
   AnchorPoseId home_ = 1;  // clone that errors are counted from; at first where the map began
   std::uint64_t generation_ = 0;
