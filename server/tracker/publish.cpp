@@ -18,7 +18,8 @@ Eigen::Matrix3d KnownInCamera(const FilterState& filter, const Eigen::Vector3d& 
 }  // namespace
 
 std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
-                                                          const StageTimes& times) const {
+                                                          const StageTimes& times) {
+  LocateDormant();
   auto snapshot = std::make_shared<MapSnapshot>();
   snapshot->frame_id = frame.id;
   snapshot->capture_time_ns = frame.capture_time_ns;

@@ -68,7 +68,8 @@ class Tracker::Impl {
   void Remember(const CameraModel& camera);
   /// Of a feature, in the filter or at rest; nothing if it is neither.
   std::optional<Eigen::Vector3d> PointNow(FeatureId id) const;
-  /// Landmarks at rest, as the keyframes have them.
+  /// Landmarks at rest, as the keyframes have them (LocateDormant).
+  void LocateDormant();
   void PublishDormant(MapSnapshot& snapshot) const;
   OldLandmarks OldOnes() const;
   void CloseLoops(const Frame& frame);
@@ -81,7 +82,7 @@ class Tracker::Impl {
   void SeekStart(const Frame& frame);
   /// Filter, map and keyframes anew, from a start that holds; the camera from this frame's matches.
   void TakeOver(const FoundStart& start, const Frame& frame);
-  std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times) const;
+  std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times);
 
   SourceInfo source_;
   TrackerOptions options_;
