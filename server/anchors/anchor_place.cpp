@@ -226,17 +226,26 @@ void ForgetSeed(AnchorPlace& place) {
 }  // namespace
 
 MapView::MapView(std::shared_ptr<const MapSnapshot> snapshot) : snapshot_(std::move(snapshot)) {
-  by_id_.reserve(snapshot_->features.size());
-  for (const FeatureSnapshot& feature : snapshot_->features) {
-    const double check = feature.point_in_world.sum() + feature.covariance_in_world.sum() +
-                         feature.covariance_in_camera.sum();
-    if (std::isfinite(check)) by_id_.emplace(feature.id, &feature);
+  const std::vector<FeatureSnapshot>& features = snapshot_->features;
+  for (std::size_t k = 0; k < features.size(); ++k) {
+    if (k == 0 || features[k].id <= features[k - 1].id) stretches_.push_back(k);
   }
 }
 
 const FeatureSnapshot* MapView::Find(FeatureId id) const {
-  const auto found = by_id_.find(id);
-  return found == by_id_.end() ? nullptr : found->second;
+  const std::vector<FeatureSnapshot>& features = snapshot_->features;
+  for (std::size_t s = 0; s < stretches_.size(); ++s) {
+    const std::size_t end = s + 1 < stretches_.size() ? stretches_[s + 1] : features.size();
+    const auto last = features.begin() + static_cast<std::ptrdiff_t>(end);
+    const auto at = std::lower_bound(
+        features.begin() + static_cast<std::ptrdiff_t>(stretches_[s]), last, id,
+        [](const FeatureSnapshot& feature, FeatureId key) { return feature.id < key; });
+    if (at == last || at->id != id) continue;
+    const double check =
+        at->point_in_world.sum() + at->covariance_in_world.sum() + at->covariance_in_camera.sum();
+    if (std::isfinite(check)) return &*at;
+  }
+  return nullptr;
 }
 
 PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPlace& place,

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <absl/container/flat_hash_map.h>
 
 #include <cstdint>
 #include <memory>
@@ -25,7 +24,9 @@ class MapView {
 
  private:
   std::shared_ptr<const MapSnapshot> snapshot_;
-  absl::flat_hash_map<FeatureId, const FeatureSnapshot*> by_id_;
+  /// Begins of the stretches of rising ids: the tracker's lists are two. No index of all features
+  /// for every frame: most of a large map rests, and few are asked for.
+  std::vector<std::size_t> stretches_;
 };
 
 /// One of the features that carry an anchor.

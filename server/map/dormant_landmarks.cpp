@@ -31,37 +31,63 @@ void DormantLandmarks::Move(const std::function<Similarity3(FeatureId)>& world_f
   }
 }
 
-void DormantLandmarks::Forget(const Lookup& lookup) {
-  std::erase_if(landmarks_, [&](const auto& entry) { return !lookup(entry.first); });
+void DormantLandmarks::Locate(const VersionOf& version, const Lookup& lookup) {
+  KeyframeId asked = -1;  // those of one keyframe mostly follow each other
+  std::uint64_t now = 0;
+  const auto version_of = [&](KeyframeId id) {
+    if (id != asked) now = version(id);
+    asked = id;
+    return now;
+  };
+  for (auto at = landmarks_.begin(); at != landmarks_.end();) {
+    DormantLandmark::Place& place = at->second.place;
+    if (place.version != 0 && version_of(place.known.anchor) == place.version) {
+      ++at;
+      continue;
+    }
+    const auto known = lookup(at->first);
+    if (!known) {
+      at = landmarks_.erase(at);
+      continue;
+    }
+    ++at;
+    place.version = version_of(known->anchor);
+    place.known = *known;
+    place.somewhere = known->estimate.inverse_range > 0.0;
+    if (!place.somewhere) continue;
+    place.range_m = 1.0 / known->estimate.inverse_range;
+    place.ray = known->world_from_anchor.rotation * known->estimate.bearing;
+    place.point_in_world = known->PointInWorld();
+  }
 }
 
 std::vector<std::pair<KeyframeId, std::vector<FeatureId>>> DormantLandmarks::InView(
     const CameraModel& camera, const Rigid3& world_from_camera, std::int64_t frame, int wanted,
-    std::span<const Eigen::Vector2d> occupied, const Lookup& lookup) const {
+    std::span<const Eigen::Vector2d> occupied) const {
   const Rigid3 camera_from_world = world_from_camera.Inverse();
+  const double least_cosine = std::cos(options_.max_view_angle_rad);
   std::map<KeyframeId, std::vector<FeatureId>> by_keyframe;
   for (const auto& [id, dormant] : landmarks_) {
     if (frame < dormant.rests_until) continue;
-    const auto known = lookup(id);
-    if (!known || !(known->estimate.inverse_range > 0.0)) continue;
-    const double range = 1.0 / known->estimate.inverse_range;
-    const Eigen::Vector3d ray = known->world_from_anchor.rotation * known->estimate.bearing;
-    const Eigen::Vector3d point = known->PointInWorld();
+    const DormantLandmark::Place& place = dormant.place;
+    if (!place.somewhere) continue;
+    const double range = place.range_m;
+    const Eigen::Vector3d& point = place.point_in_world;
     const Eigen::Vector3d seen = camera_from_world * point;
     const double distance = seen.norm();
     if (seen.z() < 0.2 * distance || distance * options_.max_scale < range ||
         distance > options_.max_scale * range) {
       continue;
     }
-    const double cosine = ray.dot(point - world_from_camera.translation) / distance;
-    if (cosine < std::cos(options_.max_view_angle_rad)) continue;
+    const double cosine = place.ray.dot(point - world_from_camera.translation) / distance;
+    if (cosine < least_cosine) continue;
     const auto pixel = camera.Project(seen);
     if (!pixel || !camera.InImage(*pixel, options_.border_px)) continue;
     const auto near = [&](const Eigen::Vector2d& other) {
       return (other - *pixel).squaredNorm() < options_.apart_px * options_.apart_px;
     };
     if (std::any_of(occupied.begin(), occupied.end(), near)) continue;
-    by_keyframe[known->anchor].push_back(id);
+    by_keyframe[place.known.anchor].push_back(id);
   }
   std::erase_if(by_keyframe, [&](const auto& group) {
     const auto seeded = [&](FeatureId id) { return landmarks_.at(id).landmark.seeded; };

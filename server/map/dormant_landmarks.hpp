@@ -21,6 +21,15 @@ struct DormantLandmark {
   Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  // when it left [m^2]
   std::int64_t rests_until = 0;                                   // frame
   int failures = 0;  // times that it was woken and not seen
+  /// Where the keyframe graph had it when it was last asked (Locate).
+  struct Place {
+    std::uint64_t version = 0;  // of its keyframe; 0: never asked
+    KeyframeGraph::Remembered known;
+    bool somewhere = false;                          // adjustment may have put it behind infinity
+    double range_m = 0.0;                            // from its keyframe, along `ray`
+    Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();  // unit, in world
+    Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
+  } place;
 };
 
 struct DormantOptions {
@@ -38,6 +47,7 @@ struct DormantOptions {
 class DormantLandmarks {
  public:
   using Lookup = std::function<std::optional<KeyframeGraph::Remembered>(FeatureId)>;
+  using VersionOf = std::function<std::uint64_t(KeyframeId)>;
 
   explicit DormantLandmarks(const DormantOptions& options) : options_(options) {}
 
@@ -50,14 +60,16 @@ class DormantLandmarks {
   DormantLandmark Take(FeatureId id);
   /// The map was moved: how well each is known goes along.
   void Move(const std::function<Similarity3(FeatureId)>& world_from_before);
+  /// Asks the graph where its landmarks are now: only about those whose keyframe has changed since.
   /// Those that the graph has forgotten go.
-  void Forget(const Lookup& lookup);
+  void Locate(const VersionOf& version, const Lookup& lookup);
 
-  /// Landmarks that should be seen from here, about `wanted` of them, by the keyframes that saw
-  /// them first; most promising keyframes first. `occupied`: pixels of what is in view already.
+  /// Of those located: landmarks that should be seen from here, about `wanted` of them, by the
+  /// keyframes that saw them first; most promising keyframes first. `occupied`: pixels of what is
+  /// in view already.
   std::vector<std::pair<KeyframeId, std::vector<FeatureId>>> InView(
       const CameraModel& camera, const Rigid3& world_from_camera, std::int64_t frame, int wanted,
-      std::span<const Eigen::Vector2d> occupied, const Lookup& lookup) const;
+      std::span<const Eigen::Vector2d> occupied) const;
 
  private:
   DormantOptions options_;

@@ -34,6 +34,7 @@ KeyframeId KeyframeGraph::Add(const Rigid3& world_from_camera, double distance_m
   Keyframe& keyframe = keyframes_[id];
   keyframe.world_from_camera = world_from_camera;
   keyframe.distance_m = distance_m;
+  keyframe.version = ++changes_;
   keyframe.sightings.assign(sightings.begin(), sightings.end());
   for (const GraphSighting& sighting : sightings) {
     const auto point = points_.find(sighting.id);
@@ -100,7 +101,14 @@ std::optional<Rigid3> KeyframeGraph::Pose(KeyframeId id) const {
 
 void KeyframeGraph::SetPose(KeyframeId id, const Rigid3& world_from_camera) {
   const auto at = keyframes_.find(id);
-  if (at != keyframes_.end()) at->second.world_from_camera = world_from_camera;
+  if (at == keyframes_.end()) return;
+  at->second.world_from_camera = world_from_camera;
+  at->second.version = ++changes_;
+}
+
+std::uint64_t KeyframeGraph::Version(KeyframeId id) const {
+  const auto at = keyframes_.find(id);
+  return at == keyframes_.end() ? 0 : at->second.version;
 }
 
 std::optional<KeyframeGraph::Remembered> KeyframeGraph::Remember(FeatureId id) const {
@@ -113,7 +121,9 @@ std::optional<KeyframeGraph::Remembered> KeyframeGraph::Remember(FeatureId id) c
 
 void KeyframeGraph::SetEstimate(FeatureId id, const GraphEstimate& estimate) {
   const auto at = points_.find(id);
-  if (at != points_.end()) at->second.estimate = estimate;
+  if (at == points_.end()) return;
+  at->second.estimate = estimate;
+  keyframes_.at(at->second.anchor).version = ++changes_;
 }
 
 KeyframeGraph::Ranked KeyframeGraph::WhoSees(std::span<const FeatureId> points) const {
@@ -268,11 +278,13 @@ void KeyframeGraph::Take(const Job& job) {
   }
   for (auto it = keyframes_.upper_bound(job.newest); it != keyframes_.end(); ++it) {
     it->second.world_from_camera = moved * it->second.world_from_camera;
+    it->second.version = ++changes_;
   }
   for (std::size_t k = 0; k < job.points.size(); ++k) {
     const auto at = points_.find(job.points[k]);
     if (at == points_.end()) continue;
     at->second.estimate = {job.problem.points[k].bearing, job.problem.points[k].inverse_range};
+    keyframes_.at(at->second.anchor).version = ++changes_;
   }
 }
 

@@ -95,6 +95,9 @@ class KeyframeGraph {
     }
   };
   std::optional<Remembered> Remember(FeatureId id) const;
+  /// Changes whenever the keyframe or a point that it saw first does; 0: there is no such keyframe.
+  /// So who remembers a large map need not ask for all of it in every frame.
+  std::uint64_t Version(KeyframeId id) const;
   /// The filter's last word on a feature that leaves it.
   void SetEstimate(FeatureId id, const GraphEstimate& estimate);
   /// Keyframes by rising id, and how many points tie two of them: born in one, seen from the other.
@@ -124,6 +127,7 @@ class KeyframeGraph {
     double distance_m = 1.0;
     std::vector<GraphSighting> sightings;
     std::vector<FeatureId> births;
+    std::uint64_t version = 0;
   };
   struct Point {
     KeyframeId anchor = 0;
@@ -154,6 +158,7 @@ class KeyframeGraph {
   std::map<KeyframeId, Keyframe> keyframes_;
   std::unordered_map<FeatureId, Point> points_;
   KeyframeId next_ = 0;
+  std::uint64_t changes_ = 0;  // never counted back: versions of a cleared graph mean nothing now
 };
 
 }  // namespace saccade

@@ -31,6 +31,7 @@ void KeyframeGraph::Move(const std::function<const Similarity3&(KeyframeId)>& wo
     const Similarity3& moved = world_from_before(id);
     keyframe.world_from_camera = moved.Move(keyframe.world_from_camera);
     keyframe.distance_m *= moved.scale;
+    keyframe.version = ++changes_;
     for (const FeatureId born : keyframe.births) {
       const auto at = points_.find(born);
       if (at == points_.end()) continue;

@@ -68,8 +68,8 @@ CorridorSource::CorridorSource(const CorridorOptions& options) : options_(option
   info_.uri = "corridor";
   info_.camera = std::make_shared<const CameraModel>(lens);
   info_.target = ChessboardTarget{9, 6, kSquare, std::nullopt};
-  const double seconds = kRest_s + 0.5 * kStart_s + options.way_m / options.speed_m_s;
-  info_.frame_count = static_cast<std::uint64_t>(seconds * lens.fps);
+  const double standing_s = options.stand_s > 0.0 ? kStart_s + options.stand_s : 0.0;
+  info_.frame_count = static_cast<std::uint64_t>((WalkEnd_s() + standing_s) * lens.fps);
   Paint();
 }
 
@@ -199,11 +199,32 @@ double CorridorSource::Look(const Hit& hit, double length) const {
   return (1 - b) * ((1 - a) * top[0] + a * top[1]) + b * ((1 - a) * below[0] + a * below[1]);
 }
 
+double CorridorSource::WalkEnd_s() const {
+  return kRest_s + 0.5 * kStart_s + options_.way_m / options_.speed_m_s;
+}
+
+FrameId CorridorSource::StopFrame() const {
+  return static_cast<FrameId>(WalkEnd_s() * info_.camera->intrinsics().fps);
+}
+
 double CorridorSource::Way_m(FrameId frame) const {
   const double t = static_cast<double>(frame) / info_.camera->intrinsics().fps - kRest_s;
   if (t <= 0) return 0.0;
   if (t < kStart_s) return 0.5 * options_.speed_m_s * t * t / kStart_s;
-  return options_.speed_m_s * (t - 0.5 * kStart_s);
+  const double past_end = std::clamp(t + kRest_s - WalkEnd_s(), 0.0, kStart_s);
+  if (options_.stand_s <= 0.0 || past_end == 0.0) return options_.speed_m_s * (t - 0.5 * kStart_s);
+  return options_.way_m + options_.speed_m_s * past_end * (1.0 - 0.5 * past_end / kStart_s);
+}
+
+double CorridorSource::GazePitch(double way) const {
+  if (!options_.look_round) return 0.0;
+  constexpr std::array<double, 3> kPitch_rad = {0.0, 0.45, -0.45};
+  const auto round = static_cast<std::size_t>(way / Round_m());
+  const double since =
+      std::min(1.0, way - static_cast<double>(round) * Round_m());  // a metre's way
+  const double now = kPitch_rad[round % kPitch_rad.size()];
+  const double before = round == 0 ? 0.0 : kPitch_rad[(round - 1) % kPitch_rad.size()];
+  return before + (now - before) * since * since * (3.0 - 2.0 * since);
 }
 
 Rigid3 CorridorSource::RoomFromCamera(FrameId frame) const {
@@ -222,7 +243,7 @@ Rigid3 CorridorSource::RoomFromCamera(FrameId frame) const {
   };
   const double yaw =
       place.heading - moving * kAside_rad + 0.06 * sway(0.31, 0) + 0.02 * sway(0.9, 1);
-  const double pitch = 0.04 * sway(0.23, 2), roll = 0.02 * sway(0.45, 3);
+  const double pitch = GazePitch(way) + 0.04 * sway(0.23, 2), roll = 0.02 * sway(0.45, 3);
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()) *
                                 Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitX()) *
                                 Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()));

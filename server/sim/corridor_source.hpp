@@ -16,11 +16,16 @@ struct CorridorOptions {
   std::uint64_t seed = 1;  // textures, sway, noise
   double way_m = 24.0;     // that the wearer walks; once round is about 20 m
   double speed_m_s = 0.8;
+  /// After the way he comes to rest within 1.5 s (0.6 m at that speed) and stands there so long,
+  /// swaying as he walked. 0: the frames end with the way.
+  double stand_s = 0.0;
   int width = 640, height = 480;
   /// Focal length that the tracker is told, too short by this share: what nobody calibrated well.
   /// 0.01: 3 px at the picture's rim.
   double lens_error = 0.0;
-  double noise = 1.5;   // sigma [grey levels]
+  double noise = 1.5;  // sigma [grey levels]
+  /// Once round he looks ahead, once up, once down, and so on: more landmarks than in one look.
+  bool look_round = false;
   bool posters = true;  // the same poster on every side, at the same place
 };
 
@@ -43,6 +48,8 @@ class CorridorSource final : public FrameSource {
   // Truth.
   Rigid3 WorldFromCamera(FrameId frame) const;
   double Way_m(FrameId frame) const;  // walked so far
+  /// The first frame after the way: he slows down. The last frame's id + 1 if he does not stand.
+  FrameId StopFrame() const;
   /// The surface point that a pixel of `frame` shows [m, world].
   Eigen::Vector3d PointAt(FrameId frame, const Eigen::Vector2d& pixel) const;
   /// Length of once round [m].
@@ -57,6 +64,8 @@ class CorridorSource final : public FrameSource {
     double u = 0.0, v = 0.0;  // [m] on the surface
   };
   static Hit Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
+  double WalkEnd_s() const;
+  double GazePitch(double way) const;
   void Paint();
   cv::Mat PaintWall(std::mt19937_64& random, int width, int height) const;
   double Look(const Hit& hit, double length) const;

@@ -9,7 +9,6 @@ namespace saccade {
 namespace {
 
 constexpr std::size_t kNormals = std::size_t{1} << 20;
-constexpr double kCornerLoss = 0.14;  // vignetting in the picture's corners
 
 std::uint64_t Hash(std::uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -27,7 +26,7 @@ Sensor::Sensor(const SimOptions& options) : options_(options) {
     for (int u = 0; u < options.width; ++u) {
       const double r2 = ((u - cx) * (u - cx) + (v - cy) * (v - cy)) / (cx * cx + cy * cy);
       vignette_.push_back(
-          static_cast<std::uint16_t>(std::lround(1024.0 * (1 - kCornerLoss * r2 * r2))));
+          static_cast<std::uint16_t>(std::lround(1024.0 * (1 - options.vignetting * r2 * r2))));
     }
   }
   // Box-Muller on our own bits: the standard library's distributions differ between makers.
@@ -47,15 +46,17 @@ Sensor::Sensor(const SimOptions& options) : options_(options) {
 }
 
 double Sensor::Gain(std::uint64_t frame) const {
-  if (!options_.auto_exposure) return 1.0;
+  if (options_.auto_exposure != SimExposure::kDrift) return 1.0;
   const double t = static_cast<double>(frame) / options_.fps;
   const auto phase = static_cast<double>(Hash(options_.seed + 77) % 628) * 0.01;
   return 1.0 + 0.06 * std::sin(0.35 * t + phase) + 0.025 * std::sin(1.9 * t + 2 * phase) -
          0.06 * std::sin(phase) - 0.025 * std::sin(2 * phase);
 }
 
-void Sensor::Apply(std::uint64_t frame, bool with_noise, cv::Mat& bgr) const {
-  const auto gain = static_cast<std::uint32_t>(std::lround(1024.0 * Gain(frame)));
+void Sensor::Apply(std::uint64_t frame, const cv::Vec3d& gain, bool with_noise,
+                   cv::Mat& bgr) const {
+  std::array<std::uint32_t, 3> gains{};
+  for (int c = 0; c < 3; ++c) gains[c] = static_cast<std::uint32_t>(std::lround(1024.0 * gain[c]));
   // Variance: a third of it is read noise, the rest grows with the light (shot noise).
   std::array<std::int32_t, 256> sigma{};  // * 256
   for (std::size_t i = 0; i < sigma.size(); ++i) {
@@ -73,8 +74,8 @@ void Sensor::Apply(std::uint64_t frame, bool with_noise, cv::Mat& bgr) const {
         (options_.seed << 40) ^ (frame * 4096 + static_cast<std::uint64_t>(v));
     const std::int8_t* noise = &normal_[Hash(row + 1) % (kNormals - 3 * width)];
     for (std::size_t u = 0; u < width; ++u) {
-      const std::uint32_t factor = (gain * vignette[u]) >> 10;
       for (int c = 0; c < 3; ++c, ++pixel, ++noise) {
+        const std::uint32_t factor = (gains[c] * vignette[u]) >> 10;
         const std::uint32_t light = std::min<std::uint32_t>((*pixel * factor + 512) >> 10, 255);
         const std::int32_t value =
             static_cast<std::int32_t>(light) + ((sigma[light] * *noise + 4096) >> 13);

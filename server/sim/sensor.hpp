@@ -13,11 +13,12 @@ class Sensor {
  public:
   explicit Sensor(const SimOptions& options);
 
-  /// Gain of frame `frame` over the well exposed picture: drifts and breathes by some per cent.
+  /// Gain of frame `frame` over the well exposed picture where it does not follow the scene: drifts
+  /// and breathes by some per cent.
   double Gain(std::uint64_t frame) const;
-  /// Applies vignetting and gain, and noise if `with_noise`, in place; `bgr` is CV_8UC3. The noise
-  /// depends on the seed and the frame alone.
-  void Apply(std::uint64_t frame, bool with_noise, cv::Mat& bgr) const;
+  /// Applies vignetting and the gain of each channel, and noise if `with_noise`, in place; `bgr` is
+  /// CV_8UC3. The noise depends on the seed and the frame alone.
+  void Apply(std::uint64_t frame, const cv::Vec3d& gain, bool with_noise, cv::Mat& bgr) const;
 
  private:
   SimOptions options_;

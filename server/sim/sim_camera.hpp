@@ -2,11 +2,13 @@
 
 #include <absl/status/statusor.h>
 
+#include <map>
 #include <memory>
 #include <vector>
 
 #include "server/gl/gl_context.hpp"
 #include "server/sim/lens.hpp"
+#include "server/sim/picture_effects.hpp"
 #include "server/sim/scene_renderer.hpp"
 #include "server/sim/sensor.hpp"
 #include "server/sim/sim_options.hpp"
@@ -39,14 +41,24 @@ class SimCamera {
 
  private:
   SimCamera(const CameraModel& camera, const SimOptions& options, const Wearer& wearer);
+  /// One exposure of the whole picture.
+  absl::Status Expose(double time_s, const HeadPath& head, cv::Mat& picture);
+  /// The same with a shutter that rolls: each row is exposed as much later as it is read later.
+  absl::Status ExposeRows(double time_s, const HeadPath& head, cv::Mat& picture);
+  /// Gain of each channel that follows what the room looked like in the second before.
+  absl::StatusOr<cv::Vec3d> SceneGain(double time_s, const HeadPath& head);
+  /// Mean light of each channel at step `step` of a grid in time.
+  absl::StatusOr<cv::Vec3d> LightAt(std::int64_t step, const HeadPath& head);
   /// Moments to average, so that nothing moves much more than a pixel between two of them.
-  int SubExposures(double time_s, const HeadPath& head) const;
+  int SubExposures(double time_s, const HeadPath& head, double span_s, int most) const;
 
   CameraModel camera_;
   SimOptions options_;
   Wearer wearer_;
   Lens lens_;
   Sensor sensor_;
+  PictureEffects effects_;
+  std::map<std::int64_t, cv::Vec3d> lights_;  // by step, as LightAt has them
   std::unique_ptr<SceneRenderer> renderer_;
   cv::Mat drawn_, sum_;
 };

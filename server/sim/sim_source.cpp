@@ -19,7 +19,10 @@ constexpr int kHeadSamples = 9;  // of the head's motion in one exposure
 }  // namespace
 
 SimSource::SimSource(const SimOptions& options, const SourceOptions& source)
-    : options_(options), source_(source), wearer_(options.motion, options.seed) {
+    : options_(options),
+      source_(source),
+      wearer_(options.motion, options.seed, options.start),
+      true_camera_(options.TrueIntrinsics()) {
   info_.uri = "sim:desk";
   info_.camera = std::make_shared<CameraModel>(options.Intrinsics());
   info_.target = SimChessboard();
@@ -64,7 +67,7 @@ absl::Status SimSource::Start(GlBackend backend) {
   return thread_
       ->Submit([this, scene, backend]() -> absl::Status {
         absl::StatusOr<std::unique_ptr<SimCamera>> camera =
-            SimCamera::Create(*scene, *info_.camera, options_, wearer_, backend);
+            SimCamera::Create(*scene, true_camera_, options_, wearer_, backend);
         if (!camera.ok()) return camera.status();
         camera_ = *std::move(camera);
         return absl::OkStatus();
@@ -78,8 +81,10 @@ SimSource::~SimSource() {
 }
 
 Timestamp SimSource::CaptureTime(FrameId frame) const {
-  return clock_zero_ns_.value_or(0) +
-         static_cast<Timestamp>(std::llround(static_cast<double>(frame) * 1e9 / options_.fps));
+  // Even times are counted in nanoseconds, as ever.
+  const double time_ns = options_.jitter_s > 0.0 ? 1e9 * options_.TimeOf(frame)
+                                                 : static_cast<double>(frame) * 1e9 / options_.fps;
+  return clock_zero_ns_.value_or(0) + static_cast<Timestamp>(std::llround(time_ns));
 }
 
 void SimSource::Request(FrameId frame) {
@@ -170,7 +175,7 @@ absl::Status SimSource::WriteTruthTo(const std::filesystem::path& file) {
 }
 
 Rigid3 SimSource::WorldFromCamera(FrameId frame) const {
-  const Rigid3 shoulder = wearer_.WorldFromShoulder(static_cast<double>(frame) / options_.fps);
+  const Rigid3 shoulder = wearer_.WorldFromShoulder(options_.TimeOf(frame));
   if (head_ == nullptr) return shoulder;
   return shoulder * head_->model().MountFromCamera(TrueHead(frame).value_or(MountAngles{}));
 }
@@ -206,12 +211,12 @@ SimTruth SimSource::Truth(FrameId frame) const {
 
 std::optional<Eigen::Vector2d> SimSource::PixelOf(FrameId frame,
                                                   const Eigen::Vector3d& point_in_world) const {
-  return info_.camera->Project(WorldFromCamera(frame).Inverse() * point_in_world);
+  return true_camera_.Project(WorldFromCamera(frame).Inverse() * point_in_world);
 }
 
 std::optional<Eigen::Vector3d> SimSource::PointAt(FrameId frame,
                                                   const Eigen::Vector2d& pixel) const {
-  const std::optional<Eigen::Vector3d> bearing = info_.camera->Unproject(pixel);
+  const std::optional<Eigen::Vector3d> bearing = true_camera_.Unproject(pixel);
   if (!bearing) return std::nullopt;
   const Rigid3 world_from_camera = WorldFromCamera(frame);
   const Eigen::Vector3d direction = world_from_camera.rotation * *bearing;
@@ -224,7 +229,7 @@ std::optional<Eigen::Vector3d> SimSource::PointAt(FrameId frame,
 bool SimSource::Visible(FrameId frame, const Eigen::Vector3d& point_in_world,
                         double tolerance_m) const {
   const std::optional<Eigen::Vector2d> pixel = PixelOf(frame, point_in_world);
-  if (!pixel || !info_.camera->InImage(*pixel)) return false;
+  if (!pixel || !true_camera_.InImage(*pixel)) return false;
   const Eigen::Vector3d eye = WorldFromCamera(frame).translation;
   const Eigen::Vector3d line = point_in_world - eye;
   const double distance = line.norm();
@@ -248,9 +253,7 @@ absl::StatusOr<cv::Mat> SimSource::RenderClean(FrameId frame) {
 
 absl::StatusOr<cv::Mat> SimSource::RenderDepth(FrameId frame) {
   return thread_
-      ->Submit([this, frame] {
-        return camera_->Depth(static_cast<double>(frame) / options_.fps, StillHead(frame));
-      })
+      ->Submit([this, frame] { return camera_->Depth(options_.TimeOf(frame), StillHead(frame)); })
       .get();
 }
 

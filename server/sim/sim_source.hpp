@@ -52,6 +52,9 @@ class SimSource final : public FrameSource {
   /// From now on the truth of each frame is written before Next() hands the frame out.
   absl::Status WriteTruthTo(const std::filesystem::path& file);
 
+  /// The lens that the pictures are truly taken with (info().camera is off by `lens_error_px`).
+  const CameraModel& true_camera() const { return true_camera_; }
+
   // Truth: for tests and evaluation only. Any thread, any frame id, whether handed out or not.
 
   SimTruth Truth(FrameId frame) const;
@@ -95,6 +98,7 @@ class SimSource final : public FrameSource {
   SourceOptions source_;
   SourceInfo info_;
   Wearer wearer_;
+  CameraModel true_camera_;  // that takes the pictures; info_.camera is what others are told
   std::vector<NamedPoint> objects_;
   std::unique_ptr<RayCaster> caster_;
   std::unique_ptr<SimTruthWriter> truth_writer_;

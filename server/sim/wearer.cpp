@@ -43,7 +43,8 @@ Rigid3 Wearer::WorldFromCamera(double time_s, const MountAngles& head) const {
 }
 
 Rigid3 Wearer::WorldFromShoulder(double time_s) const {
-  const Stance stance = StanceAt(time_s);
+  Stance stance = StanceAt(time_s);
+  if (start_ == SimStart::kTurn) stance.yaw += StartTurn(time_s);
   // Yaw, pitch and roll turn the body as pan, elevation and cyclotorsion turn the head.
   Rigid3 pose = ShoulderFromCamera({stance.yaw, stance.pitch, stance.roll});
   pose.translation = WorldFromRoom() * stance.position;
@@ -205,6 +206,13 @@ Wearer::Stance Wearer::Twist(double time_s) const {
   stance.position += 0.04 * Eigen::Vector3d(Signal(time_s, 1.6, 82), Signal(time_s, 1.7, 83),
                                             Signal(time_s, 1.5, 84));
   return stance;
+}
+
+// tum_fr1_rpy begins so: 70 deg within its first second.
+double Wearer::StartTurn(double time_s) const {
+  constexpr double kAway = 70.0 * kDegree, kTurn_s = 1.5;
+  const double side = Random(90, 0) > 0 ? 1.0 : -1.0;
+  return side * kAway * (1.0 - MinimumJerk(time_s / kTurn_s));
 }
 
 Wearer::Stance Wearer::StanceAt(double time_s) const {

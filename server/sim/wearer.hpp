@@ -17,7 +17,8 @@ Rigid3 WorldFromRoom();
 /// defined for every time >= 0. For the first second it faces the chessboard almost at rest.
 class Wearer {
  public:
-  Wearer(SimMotion motion, std::uint64_t seed) : motion_(motion), seed_(seed) {}
+  Wearer(SimMotion motion, std::uint64_t seed, SimStart start = SimStart::kRest)
+      : motion_(motion), seed_(seed), start_(start) {}
 
   /// Pose of the mount base at `time_s`; x right, y down, z forward.
   Rigid3 WorldFromShoulder(double time_s) const;
@@ -44,8 +45,12 @@ class Wearer {
   double Signal(double time_s, double knot_s, std::uint64_t channel) const;
   double Random(std::uint64_t channel, std::uint64_t index) const;  // uniform in -1 .. 1
 
+  /// What is left at `time_s` of the turn that a recording may begin with [rad].
+  double StartTurn(double time_s) const;
+
   SimMotion motion_;
   std::uint64_t seed_;
+  SimStart start_;
 };
 
 /// Rotation of a head whose axes meet in the optic centre: Ry(pan) Rx(elevation) Rz(cyclotorsion),

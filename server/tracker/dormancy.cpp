@@ -59,7 +59,7 @@ void Tracker::Impl::Rest(std::span<const FeatureId> ids) {
   }
   filter_.Remove(ids);
   map_.Remove(ids);
-  dormant_.Forget([this](FeatureId id) { return refiner_.Remember(id); });
+  LocateDormant();
 }
 
 Matrix6d Tracker::Impl::WakeCovariance(double distance_m) const {
@@ -72,15 +72,15 @@ Matrix6d Tracker::Impl::WakeCovariance(double distance_m) const {
 void Tracker::Impl::Wake(const CameraModel& camera) {
   const int missing = std::min(kMostAtOnce, keeper_.Missing(matches_));
   if (!options_.wake || missing <= 0 || dormant_.size() == 0) return;
-  const auto remember = [this](FeatureId id) { return refiner_.Remember(id); };
+  LocateDormant();
   std::vector<Eigen::Vector2d> occupied;
   for (const LandmarkMatch& match : matches_.in_view) occupied.push_back(match.pixel);
-  const auto groups = dormant_.InView(camera, filter_.camera().world_from_camera, frames_, missing,
-                                      occupied, remember);
+  const auto groups =
+      dormant_.InView(camera, filter_.camera().world_from_camera, frames_, missing, occupied);
   const double distance_m = 1.0 / std::max(1e-6, depth_.inverse_range);
   for (const auto& [keyframe, ids] : groups) {
     const AnchorPoseId clone = refiner_.CloneOf(keyframe, WakeCovariance(distance_m), filter_);
-    for (const FeatureId id : ids) WakeOne(id, clone, *remember(id));
+    for (const FeatureId id : ids) WakeOne(id, clone, *refiner_.Remember(id));
   }
   filter_.Remove({});  // a clone that nothing was woken in goes again
 }
@@ -122,19 +122,22 @@ std::optional<Eigen::Vector3d> Tracker::Impl::PointNow(FeatureId id) const {
   return known->PointInWorld();
 }
 
+void Tracker::Impl::LocateDormant() {
+  dormant_.Locate([this](KeyframeId id) { return refiner_.graph().Version(id); },
+                  [this](FeatureId id) { return refiner_.Remember(id); });
+}
+
 void Tracker::Impl::PublishDormant(MapSnapshot& snapshot) const {
   const Rigid3 camera_from_world = snapshot.world_from_camera.Inverse();
   const Eigen::Matrix3d turn = camera_from_world.RotationMatrix();
   for (const auto& [id, dormant] : dormant_.all()) {
-    const auto known = refiner_.Remember(id);
-    // Adjustment may have put it behind infinity: then it is nowhere.
-    if (!known || !(known->estimate.inverse_range > 0.0)) continue;
+    if (!dormant.place.somewhere) continue;
     FeatureSnapshot& feature = snapshot.features.emplace_back();
     feature.id = id;
     feature.matched_count = dormant.landmark.matched;
-    feature.point_in_world = known->PointInWorld();
+    feature.point_in_world = dormant.place.point_in_world;
     // As well as it was known, and its keyframe as well as it will be when it is woken.
-    const double off = options_.wake_position_share / known->estimate.inverse_range;
+    const double off = options_.wake_position_share * dormant.place.range_m;
     feature.covariance_in_world =
         dormant.covariance_in_world + off * off * Eigen::Matrix3d::Identity();
     feature.covariance_in_camera = turn * feature.covariance_in_world * turn.transpose();

@@ -49,8 +49,23 @@ std::optional<MapKeeper::DepthGuess> MapKeeper::GuessDepth(const FilterState& fi
   return DepthGuess{median, 0.5 * median};
 }
 
+void MapKeeper::Forget(std::int64_t frame, FilterState& filter, LandmarkMap& map,
+                       const Judge& may_rest, const Judge& left_behind) const {
+  if (options_.forget_after <= 0) return;
+  std::vector<FeatureId> gone;
+  for (const Landmark& landmark : map.all()) {
+    if (landmark.known || landmark.seeded ||
+        landmark.last_in_view_frame >= frame - options_.forget_after) {
+      continue;
+    }
+    if (left_behind(landmark) && !may_rest(landmark)) gone.push_back(landmark.id);
+  }
+  filter.Remove(gone);
+  map.Remove(gone);
+}
+
 void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest,
-                       const MayRest& may_rest) {
+                       const Judge& may_rest, const Judge& left_behind) {
   std::vector<FeatureId> gone = filter.RemoveBehind();
   std::vector<FeatureId> resting;
   const std::vector<FeatureId> unreliable = Unreliable(map, RetirementOptions());
@@ -63,13 +78,14 @@ void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map
     if (landmark.known) continue;
     const bool out_of_sight =
         options_.rest_after > 0 && landmark.last_in_view_frame < frame - options_.rest_after;
-    if (FailsProbation(landmark) || (out_of_sight && may_rest(landmark))) {
+    if (FailsProbation(landmark) || (out_of_sight && left_behind(landmark) && may_rest(landmark))) {
       resting.push_back(landmark.id);
     }
   }
   std::sort(resting.begin(), resting.end());
   resting.erase(std::unique(resting.begin(), resting.end()), resting.end());
   if (!resting.empty()) rest(resting);
+  Forget(frame, filter, map, may_rest, left_behind);
   const int excess = static_cast<int>(filter.feature_count()) - options_.max_features;
   if (excess > 0) rest(LeastWorth(map, excess, frame));
 }

@@ -32,12 +32,13 @@ class MapKeeper {
 
   /// Takes features out of filter and map that may be of use later.
   using Rest = std::function<void(std::span<const FeatureId>)>;
-  /// Whether a feature would be of use later.
-  using MayRest = std::function<bool(const Landmark&)>;
-  /// Removes what is unreliable or impossible. To `rest` goes what is out of sight and `may_rest`,
-  /// what was woken in vain and, in a full map, what is worth least.
+  using Judge = std::function<bool(const Landmark&)>;
+  /// Removes what is unreliable or impossible. What is out of sight and `left_behind` (the camera
+  /// is elsewhere than where it saw it first) goes to `rest` if it `may_rest` (it would be of use
+  /// later), and is forgotten if not; to `rest` go, too, what was woken in vain and, in a full map,
+  /// what is worth least.
   void Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest,
-              const MayRest& may_rest);
+              const Judge& may_rest, const Judge& left_behind);
   /// A woken landmark that is hardly ever found where it was thought to be.
   static bool FailsProbation(const Landmark& landmark);
   /// How many more features the map wants in view.
@@ -60,6 +61,9 @@ class MapKeeper {
   bool Wants(const FrameMatches& matches) const;
 
  private:
+  void Forget(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Judge& may_rest,
+              const Judge& left_behind) const;
+
   TrackerOptions options_;
   CornerDetector detector_;
   std::vector<Corner> corners_;

@@ -31,7 +31,8 @@ Difficulties Tracker::Impl::SeeDifficulties() const {
 }
 
 std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
-                                                          const StageTimes& times) const {
+                                                          const StageTimes& times) {
+  LocateDormant();
   auto snapshot = std::make_shared<MapSnapshot>();
   snapshot->frame_id = frame.id;
   snapshot->capture_time_ns = frame.capture_time_ns;

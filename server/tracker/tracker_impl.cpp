@@ -329,7 +329,8 @@ void Tracker::Impl::Manage(const Frame& frame) {
   }
   keeper_.Retire(
       frames_, filter_, map_, [this](std::span<const FeatureId> ids) { Rest(ids); },
-      [this](const Landmark& landmark) { return HasMovedFrom(landmark) && MayRest(landmark); });
+      [this](const Landmark& landmark) { return MayRest(landmark); },
+      [this](const Landmark& landmark) { return HasMovedFrom(landmark); });
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;

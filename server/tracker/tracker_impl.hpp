@@ -72,7 +72,8 @@ class Tracker::Impl {
   void Remember(const CameraModel& camera);
   /// Of a feature, in the filter or at rest; nothing if it is neither.
   std::optional<Eigen::Vector3d> PointNow(FeatureId id) const;
-  /// Landmarks at rest, as the keyframes have them.
+  /// Landmarks at rest, as the keyframes have them (LocateDormant).
+  void LocateDormant();
   void PublishDormant(MapSnapshot& snapshot) const;
   OldLandmarks OldOnes() const;
   void CloseLoops(const Frame& frame);
@@ -87,7 +88,7 @@ class Tracker::Impl {
   void TakeOver(const FoundStart& start, const Frame& frame);
   std::optional<double> MovedPx(const CameraModel& camera, double dt) const;
   Difficulties SeeDifficulties() const;
-  std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times) const;
+  std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times);
 
   SourceInfo source_;
   TrackerOptions options_;

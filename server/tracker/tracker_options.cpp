@@ -59,6 +59,7 @@ const Key kKeys[] = {
     {"features_in_view", &O::features_in_view, 8, 400},
     {"max_features", &O::max_features, 10, 400},
     {"rest_after", &O::rest_after, 0, 1e9},
+    {"forget_after", &O::forget_after, 0, 1e9},
     {"wake", &O::wake, 0, 1},
     {"loops", &O::loops, 0, 1},
     {"wake_position_share", &O::wake_position_share, 1e-4, 1},

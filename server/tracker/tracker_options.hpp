@@ -56,7 +56,10 @@ struct TrackerOptions {
   int features_in_view = 80;  // new ones are started below
   int max_features = 250;     // in the filter; update time grows with the square
   int rest_after = 30;  // frames out of sight, then what may rest does; 0: when the filter is full
-  bool wake = true;     // what left well measured is taken back where it comes into view again
+  /// The same, then what is too little known to rest is forgotten, where the camera has moved on;
+  /// 0: when the filter is full. They made up 95 of 250 features of a walk, never seen again.
+  int forget_after = 30;
+  bool wake = true;  // what left well measured is taken back where it comes into view again
   double wake_position_share = 0.01;   // sigma of where it was seen from, of the distance...
   double wake_angle_sigma_rad = 0.01;  // ...and of that camera's direction
   int births_per_clone = 15;           // features that share one pose clone (slam-spec 5.4)

@@ -74,6 +74,22 @@ void AddFrame(CLI::App& app, FrameBenchArguments& arguments, std::string& source
   frame->add_flag("--json", json, "Print JSON, not a table");
 }
 
+void AddMap(CLI::App& app, MapBenchArguments& arguments, bool& json) {
+  CLI::App* map = app.add_subcommand(
+      "map", "The whole tracker on the same pictures, with a young map and with an old one");
+  map->add_option("--way", arguments.way_m, "Metres of corridor that the old map is made of")
+      ->check(CLI::Range(12.0, 200.0))
+      ->capture_default_str();
+  map->add_option("--runs", arguments.runs, "Runs; of each frame the least time counts")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  map->add_option("--seed", arguments.seed, "Of the corridor")->capture_default_str();
+  map->add_option("--config", arguments.config, "TOML file with tracker options");
+  map->add_option("--set", arguments.set, "One tracker option as key=value; may be repeated")
+      ->take_all();
+  map->add_flag("--json", json, "Print JSON, not a table");
+}
+
 int Main(int argc, char** argv) {
   if (AsksForParts(argc, argv)) return RunParts(argc, argv);
   CLI::App app("Saccade's benchmarks; small parts by --benchmark_filter=REGEX", "saccade-bench");
@@ -85,11 +101,13 @@ int Main(int argc, char** argv) {
   FilterBenchArguments filter;
   SearchBenchArguments search;
   FrameBenchArguments frame;
+  MapBenchArguments map;
   std::string source = "sim:" + frame.source;
   bool json = false;
   AddFilter(app, filter, json);
   AddSearch(app, search, json);
   AddFrame(app, frame, source, json);
+  AddMap(app, map, json);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -104,6 +122,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("filter")) report = BenchFilter(filter);
   if (app.got_subcommand("search")) report = BenchSearch(search);
   if (app.got_subcommand("frame")) report = BenchFrame(frame);
+  if (app.got_subcommand("map")) report = BenchMap(map);
   if (!report.ok()) return Fail(report.status());
   std::cout << (json ? report->Json() : report->Table());
   return 0;

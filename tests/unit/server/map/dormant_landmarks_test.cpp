@@ -36,8 +36,8 @@ class DormantLandmarksTest : public testing::Test {
   std::vector<FeatureId> Seen(const Rigid3& from, int wanted = 100, std::int64_t frame = 0,
                               std::vector<Eigen::Vector2d> occupied = {}) {
     std::vector<FeatureId> ids;
-    for (const auto& [keyframe, group] :
-         dormant_.InView(camera_, from, frame, wanted, occupied, Lookup())) {
+    dormant_.Locate(Version(), Lookup());
+    for (const auto& [keyframe, group] : dormant_.InView(camera_, from, frame, wanted, occupied)) {
       ids.insert(ids.end(), group.begin(), group.end());
     }
     return ids;
@@ -49,6 +49,11 @@ class DormantLandmarksTest : public testing::Test {
     };
   }
 
+  DormantLandmarks::VersionOf Version() const {
+    return [this](KeyframeId) { return version_; };
+  }
+
+  std::uint64_t version_ = 1;
   CameraModel camera_{Pinhole(640, 480, 500)};
   std::map<FeatureId, KeyframeGraph::Remembered> known_;
   DormantLandmarks dormant_{DormantOptions()};
@@ -100,6 +105,27 @@ TEST_F(DormantLandmarksTest, OneThatAMarkWaitsForIsWorthAPoseAlone) {
   EXPECT_THAT(Seen(Rigid3()), ElementsAre(2));
 }
 
+TEST_F(DormantLandmarksTest, AsksOnlyAboutKeyframesThatChanged) {
+  PutFour(1, 0, -0.2);
+  PutFour(11, 1, 0.1);
+  int asked = 0;
+  std::map<KeyframeId, std::uint64_t> versions = {{0, 1}, {1, 2}};
+  const auto version = [&](KeyframeId id) { return versions[id]; };
+  const auto lookup = [&](FeatureId id) {
+    ++asked;
+    return Lookup()(id);
+  };
+  dormant_.Locate(version, lookup);
+  EXPECT_EQ(asked, 8);
+  dormant_.Locate(version, lookup);
+  EXPECT_EQ(asked, 8);
+  known_[12].world_from_anchor.translation.y() += 0.5;
+  versions[1] = 3;
+  dormant_.Locate(version, lookup);
+  EXPECT_EQ(asked, 12);
+  EXPECT_NEAR(dormant_.all().at(12).place.point_in_world.y(), 0.55, 1e-9);
+}
+
 TEST_F(DormantLandmarksTest, IsBoundedAndForgetsWithTheGraph) {
   DormantOptions options;
   options.max_landmarks = 3;
@@ -110,8 +136,11 @@ TEST_F(DormantLandmarksTest, IsBoundedAndForgetsWithTheGraph) {
   Put(4, 0, {0, 0, 2}, 40);
   EXPECT_EQ(dormant_.size(), 3u);
   EXPECT_FALSE(dormant_.Has(2)) << "matched least";
+  dormant_.Locate(Version(), Lookup());
+  EXPECT_TRUE(dormant_.Has(3));
   known_.erase(3);
-  dormant_.Forget(Lookup());
+  ++version_;
+  dormant_.Locate(Version(), Lookup());
   EXPECT_FALSE(dormant_.Has(3));
   EXPECT_EQ(dormant_.Take(1).landmark.matched, 50u);
   EXPECT_FALSE(dormant_.Has(1));

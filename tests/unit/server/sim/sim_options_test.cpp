@@ -21,7 +21,7 @@ TEST(SimOptions, EveryKeyIsRead) {
   EXPECT_DOUBLE_EQ(options->duration_s.value(), 2.5);
   EXPECT_DOUBLE_EQ(options->noise, 3);
   EXPECT_FALSE(options->blur);
-  EXPECT_FALSE(options->auto_exposure);
+  EXPECT_EQ(options->auto_exposure, SimExposure::kOff);
   EXPECT_NEAR(options->exposure_s, 0.004, 1e-12);
   EXPECT_EQ(options->width, 320);
   EXPECT_EQ(options->height, 240);
@@ -36,6 +36,24 @@ TEST(SimOptions, PlainUriMeansDefaults) {
   EXPECT_EQ(options->motion, SimMotion::kDesk);
   EXPECT_FALSE(options->duration_s.has_value());
   EXPECT_EQ(options->Intrinsics().model, LensModel::kBrownConrady);
+}
+
+TEST(SimOptions, RealSetsEverythingAndSingleKeysHaveTheLastWord) {
+  const absl::StatusOr<SimOptions> options =
+      SimOptions::FromUri("sim:desk?arm=off&jpeg=70&real=on&lens_error_px=3");
+  ASSERT_TRUE(options.ok()) << options.status();
+  EXPECT_EQ(options->auto_exposure, SimExposure::kScene);
+  EXPECT_EQ(options->start, SimStart::kTurn);
+  EXPECT_GT(options->rolling_shutter_s, 0);
+  EXPECT_GT(options->jitter_s, 0);
+  EXPECT_LT(options->contrast, 1);
+  EXPECT_FALSE(options->arm) << "though it stands before real=on";
+  EXPECT_EQ(options->jpeg, 70);
+  EXPECT_DOUBLE_EQ(options->lens_error_px, 3);
+  const absl::StatusOr<SimOptions> plain = SimOptions::FromUri("sim:desk?real=off");
+  ASSERT_TRUE(plain.ok());
+  EXPECT_EQ(plain->TrueIntrinsics().fx, plain->Intrinsics().fx);
+  EXPECT_EQ(plain->TimeOf(7), 7.0 / 30.0);
 }
 
 TEST(SimOptions, TheFieldOfViewStaysWithTheSize) {
@@ -57,6 +75,12 @@ TEST(SimOptions, BadInputIsRefusedByNameWithARemedy) {
            BadUri{"sim:moon", "sim:moon", "sim:desk"},
            BadUri{"sim:desk?colour=red", "'colour'", "supersampling"},
            BadUri{"sim:desk?motion=fly", "motion=fly", "walk"},
+           BadUri{"sim:desk?real=yes", "real=yes", "on or off"},
+           BadUri{"sim:desk?auto_exposure=1", "auto_exposure=1", "scene"},
+           BadUri{"sim:desk?start=fall", "start=fall", "turn"},
+           BadUri{"sim:desk?jpeg=101", "jpeg=101", "100"},
+           BadUri{"sim:desk?contrast=0", "contrast=0", "0.05"},
+           BadUri{"sim:desk?rolling_shutter_ms=40", "rolling_shutter_ms=40", "33"},
            BadUri{"sim:desk?blur=yes", "blur=yes", "on or off"},
            BadUri{"sim:desk?seed=-1", "seed=-1", "whole number"},
            BadUri{"sim:desk?seed=", "seed=", "whole number"},

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <map>
 
+#include "server/sim/corridor_source.hpp"
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
@@ -128,6 +129,57 @@ TEST(Dormancy, WhatIsOutOfSightStaysWhereItIs) {
   EXPECT_GT(resting.known, 30);
   EXPECT_GT(share, 0.5);
   EXPECT_EQ(most_kept_still, 0) << "in the filter all move with all";
+}
+
+/// Features in the filter that were in no picture for more than `frames`; in the published list
+/// they come first, by rising ids, then what is at rest.
+class OutOfSight {
+ public:
+  explicit OutOfSight(int frames) : frames_(frames) {}
+
+  int Count(const MapSnapshot& snapshot) {
+    int count = 0;
+    FeatureId before = 0;
+    for (const FeatureSnapshot& feature : snapshot.features) {
+      if (feature.id <= before) break;
+      before = feature.id;
+      const auto at = last_seen_.try_emplace(feature.id, snapshot.frame_id).first;
+      if (feature.pixel) at->second = snapshot.frame_id;
+      count += snapshot.frame_id - at->second > frames_ ? 1 : 0;
+    }
+    return count;
+  }
+
+ private:
+  FrameId frames_;
+  std::map<FeatureId, FrameId> last_seen_;
+};
+
+// A walk leaves features behind that were seen too briefly to be of use later: they filled the
+// filter up to its limit, and an update costs the square of what is in it.
+TEST(Dormancy, WhatWasLeftBehindTooYoungToRestLeavesTheFilter) {
+  CorridorOptions options;
+  options.way_m = 6.0;
+  CorridorSource source(options);
+  const int patience = TrackerOptions().rest_after + 5;
+  auto tracker = Tracker::Create(source.info(), TrackerOptions());
+  ASSERT_TRUE(tracker.ok()) << tracker.status();
+  OutOfSight out_of_sight(patience);
+  int most = 0;
+  std::size_t landmarks = 0;
+  while (true) {
+    const auto frame = source.Next();
+    ASSERT_TRUE(frame.ok());
+    if (!*frame) break;
+    const auto snapshot = (*tracker)->Track(**frame);
+    const int now = out_of_sight.Count(*snapshot);
+    if ((*frame)->id > 150) most = std::max(most, now);
+    landmarks = snapshot->features.size();
+  }
+  std::printf("%zu landmarks, at most %d in the filter that are long out of sight\n", landmarks,
+              most);
+  EXPECT_GT(landmarks, 250u);
+  EXPECT_LT(most, 15);
 }
 
 }  // namespace
