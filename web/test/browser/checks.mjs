@@ -7,7 +7,7 @@ import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { Expert } from './expert.mjs';
 import { frozenPicture } from './freeze.mjs';
-import { displacement } from './outline.mjs';
+import { CLEAR, displacement, REACH_PX } from './outline.mjs';
 import { cubePixels, inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
 import { decodePng, median, pixelsOf, psnr } from './pictures.mjs';
 import { renderTruth, startServer, Truth } from './server.mjs';
@@ -313,7 +313,9 @@ async function cubeError({ expert, truth, camera }, { point }) {
     ((y + 0.5) / ratio - top) / scale - 0.5,
   ]);
   const moved = displacement(wanted, found);
-  return moved && length(moved);
+  if (moved) return length(moved);
+  // A cube is drawn, but not there: that counts, too. Less of it: hidden, or out of view.
+  return found.length > CLEAR * wanted.length ? REACH_PX : undefined;
 }
 
 /** How many marks the page lists, once that number has stood for two seconds: edits may be on their way. */

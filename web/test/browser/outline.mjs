@@ -1,8 +1,8 @@
 // Where a wire frame was drawn, by its own lines: what else is drawn in its colour (a label, an arrow at
 // the edge of the picture) and what lies over a part of it do not count.
 
-const REACH_PX = 40;
-const CLEAR = 0.6; // of its lines that have to be seen
+export const REACH_PX = 40;
+export const CLEAR = 0.6; // of its lines that have to be seen
 const NEAR_PX = 1; // a line is 2 px wide
 
 /**

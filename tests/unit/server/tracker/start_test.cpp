@@ -124,8 +124,6 @@ TEST_F(StartOfRecording, APictureThatComesAgainIsNoMeasurement) {
   }
 }
 
-// To the bit only from one process to the next: sums are taken in another order where memory lies
-// otherwise.
 // What was seen for less than two seconds is seldom found again: lost in it, one was lost for good.
 TEST_F(StartOfRecording, AYoungMapThatIsNotFoundAgainMakesRoomForAnother) {
   for (std::size_t k = 0; k < 30; ++k) Show(k);
@@ -146,6 +144,8 @@ TEST_F(StartOfRecording, AYoungMapThatIsNotFoundAgainMakesRoomForAnother) {
   EXPECT_LT(lost, 40);
 }
 
+// To the bit only from one process to the next: sums are taken in another order where memory lies
+// otherwise.
 TEST_F(StartOfRecording, TwoRunsAreTheSame) {
   std::vector<Rigid3> first;
   for (std::size_t k = 0; k < 40; ++k) first.push_back(Show(k)->world_from_camera);
