@@ -12,6 +12,7 @@ namespace {
 
 constexpr Timestamp kKeyFrameInterval = 250'000'000;
 constexpr Timestamp kIdle = 250'000'000;  // no frame for so long: the source stands still
+constexpr Timestamp kRateInterval = 1'000'000'000;
 
 }  // namespace
 
@@ -95,10 +96,22 @@ absl::Status ViewEncoder::Prepare(const cv::Mat& picture, const TrackedFrame& fr
   return absl::OkStatus();
 }
 
+/// A computer that cannot keep up codes fewer pictures than the camera takes; each gets more bits.
+void ViewEncoder::TellFrameRate(Timestamp now_ns) {
+  ++coded_;
+  const Timestamp elapsed_ns = now_ns - rate_told_ns_;
+  if (elapsed_ns < kRateInterval) return;
+  // Longer: nobody watched, or the source stood still.
+  if (elapsed_ns < 2 * kRateInterval) encoder_->SetFrameRate(coded_ / Seconds(elapsed_ns));
+  rate_told_ns_ = now_ns;
+  coded_ = 0;
+}
+
 absl::StatusOr<EncodedPicture> ViewEncoder::DrawAndCode(const TrackedFrame& frame) {
   try {
     const cv::Mat picture = draw_(frame);
     if (absl::Status ready = Prepare(picture, frame); !ready.ok()) return ready;
+    TellFrameRate(MonotonicNow());
     return encoder_->Encode(picture, TakeKeyFrameRequest(MonotonicNow()));
   } catch (const std::exception& error) {  // no memory, or what OpenCV will not draw
     return absl::InternalError(error.what());

@@ -58,6 +58,7 @@ class ViewEncoder {
   /// Codes the newest frame once more if no other comes and the last time is long enough ago.
   void PostAgain();
   bool TakeKeyFrameRequest(Timestamp now_ns);
+  void TellFrameRate(Timestamp now_ns);
   absl::Status Prepare(const cv::Mat& picture, const TrackedFrame& frame);
 
   const VideoView view_;
@@ -79,6 +80,8 @@ class ViewEncoder {
   std::unique_ptr<VideoEncoder> encoder_;
   std::uint64_t sequence_ = 0;
   Timestamp key_ns_ = 0;
+  Timestamp rate_told_ns_ = 0;
+  int coded_ = 0;  // since then
   bool failed_ = false;  // said so once
 
   Runner<TrackedFrame> runner_;  // last

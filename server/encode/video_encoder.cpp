@@ -124,6 +124,15 @@ class VideoEncoder::Impl {
     return Collect(info);
   }
 
+  void SetFrameRate(double fps_hz) {
+    constexpr double kSlowest = 1.0 / 6.0;
+    constexpr double kAsGood = 0.15;  // so much off it stays: rate control begins anew with each
+    const double wanted = std::clamp(fps_hz, kSlowest * options_.fps_hz, options_.fps_hz);
+    if (std::abs(wanted - fps_hz_) <= kAsGood * fps_hz_) return;
+    auto rate = static_cast<float>(wanted);
+    if (encoder_->SetOption(ENCODER_OPTION_FRAME_RATE, &rate) == cmResultSuccess) fps_hz_ = wanted;
+  }
+
   const VideoEncoderOptions& options() const { return options_; }
 
  private:
@@ -140,14 +149,16 @@ class VideoEncoder::Impl {
     source.pData[1] = i420_.data + width * height;
     source.pData[2] = source.pData[1] + width * height / 4;
     // Evenly spaced, whatever the scene's clock does: rate control shares bits by these.
-    source.uiTimeStamp = std::llround(1e3 * static_cast<double>(count_++) / options_.fps_hz);
+    source.uiTimeStamp = std::llround(time_ms_);
+    time_ms_ += 1e3 / fps_hz_;
     return source;
   }
 
   const VideoEncoderOptions options_;
   EncoderPtr encoder_;
   cv::Mat i420_;
-  std::int64_t count_ = 0;
+  double fps_hz_ = options_.fps_hz;
+  double time_ms_ = 0.0;
 };
 
 VideoEncoder::VideoEncoder(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -183,6 +194,8 @@ absl::StatusOr<std::unique_ptr<VideoEncoder>> VideoEncoder::Create(
 absl::StatusOr<EncodedPicture> VideoEncoder::Encode(const cv::Mat& picture, bool force_key_frame) {
   return impl_->Encode(picture, force_key_frame);
 }
+
+void VideoEncoder::SetFrameRate(double fps_hz) { impl_->SetFrameRate(fps_hz); }
 
 int VideoEncoder::coded_width() const { return impl_->options().width & ~1; }
 int VideoEncoder::coded_height() const { return impl_->options().height & ~1; }

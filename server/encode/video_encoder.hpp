@@ -40,6 +40,10 @@ class VideoEncoder {
   /// `force_key_frame`: start anew, for somebody who has nothing yet.
   absl::StatusOr<EncodedPicture> Encode(const cv::Mat& picture, bool force_key_frame);
 
+  /// How many pictures a second really come, where that is not what the options said: the bit rate
+  /// is shared among them. At least a sixth of what they said, at most that: no picture is huge.
+  void SetFrameRate(double fps_hz);
+
   int coded_width() const;   // [px], even
   int coded_height() const;  // [px], even
 
