@@ -95,7 +95,8 @@ class Adjustment {
       options.linear_solver_ordering->AddElementToGroup(point.data(), 0);
     for (PoseBlock& pose : poses_)
       options.linear_solver_ordering->AddElementToGroup(pose.data(), 1);
-    options.linear_solver_ordering->AddElementToGroup(&readout_, 1);
+    // A group of its own: within one the order is that of addresses, and results would hang on it.
+    options.linear_solver_ordering->AddElementToGroup(&readout_, 2);
     options.max_num_iterations = kIterations;
     options.function_tolerance = 1e-5;
     options.num_threads = 1;
@@ -212,6 +213,10 @@ std::vector<Attempt> Attempts(const StartProblem& problem, const std::atomic<boo
   if (!attempts.empty()) {
     const bool last = attempts.back().cost < attempts.front().cost;
     from(Reversed(last ? attempts.back().found : attempts.front().found));
+    const auto best =
+        std::min_element(attempts.begin(), attempts.end(),
+                         [](const Attempt& a, const Attempt& b) { return a.cost < b.cost; });
+    if (const auto other = OtherPlane(best->found)) from(*other);
   }
   return attempts;
 }

@@ -92,7 +92,7 @@ StartEvidence Weigh(const StartProblem& found, const MatrixXd& covariance,
 }
 
 bool GoAlike(const StartProblem& a, const StartProblem& b) {
-  constexpr double kCosine = 0.7;
+  constexpr double kCosine = 0.9;
   const auto way = [](const StartProblem& found) {
     return Vector3d(found.world_from_camera.back().translation -
                     found.world_from_camera.front().translation);

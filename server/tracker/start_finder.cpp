@@ -18,9 +18,12 @@ constexpr std::size_t kMostSolved = 12;  // keyframes of one problem, besides th
 constexpr int kFewestShared = 20;        // points that a keyframe shares with the newest
 constexpr double kParallaxSigmas = 1.5;  // root mean square that a turn leaves, before it is tried
 constexpr double kLeastNoise = 0.5;      // of R: patches seen from elsewhere are biased alike
-constexpr double kMargin = 4.5;          // half of chi squared: three sigmas
-constexpr int kFewestKnown = 12;         // points whose range is known
-constexpr double kLeastAgreeing = 0.8;   // of the sightings
+// Residuals above that are no noise of patches but what the model lacks (a shutter in a fast turn),
+// and that does not average out: a start with 0.55 counts its sigmas in full.
+constexpr double kUnmodelled = 10.0;
+constexpr double kMargin = 4.5;         // half of chi squared: three sigmas
+constexpr int kFewestKnown = 12;        // points whose range is known
+constexpr double kLeastAgreeing = 0.8;  // of the sightings
 
 }  // namespace
 
@@ -189,7 +192,7 @@ void StartFinder::Start(std::int64_t frame, const FilterState& filter) {
 }
 
 bool StartFinder::Holds(const StartEvidence& evidence) const {
-  const double noise = std::max(kLeastNoise, evidence.noise);
+  const double noise = kLeastNoise + kUnmodelled * std::max(0.0, evidence.noise - kLeastNoise);
   return noise * evidence.scale_sigma < options_.start_scale_sigma && evidence.margin > kMargin &&
          evidence.known_points >= kFewestKnown && evidence.agreeing >= kLeastAgreeing;
 }

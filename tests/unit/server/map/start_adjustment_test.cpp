@@ -47,6 +47,12 @@ class Walk {
     return problem;
   }
 
+  /// Puts every point, along its ray, on the plane normal^T X = -distance.
+  void Flatten(const Eigen::Vector3d& normal, double distance) {
+    const Eigen::Vector3d n = normal.normalized();
+    for (Eigen::Vector3d& point : points_) point *= -distance / n.dot(point);
+  }
+
   const std::vector<Rigid3>& poses() const { return poses_; }
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   static constexpr int kKeyframes = 10, kPoints = 70;
@@ -119,6 +125,49 @@ TEST(SolveStart, LeavesTheReversedSolutionThatItIsGiven) {
   const Eigen::Vector3d way = from_reversed->problem.world_from_camera.back().translation;
   EXPECT_GT(way.dot(walk.poses().back().translation), 0.0);
   EXPECT_LT(from_reversed->evidence.margin, 1e6) << "the reversed one was looked at";
+}
+
+// A desk that fills a narrow picture: one plane. What `tum_fr1_xyz` upright (360 x 480) began with.
+TEST(SolveStart, LeavesThePlanesOtherReadingThatItIsGiven) {
+  Walk walk({0.0, 0.03, 0.25}, 0.1);
+  walk.Flatten({0.0, -0.77, -0.64}, 1.2);
+  const auto right = SolveStart(walk.Problem(), kGoOn);
+  ASSERT_TRUE(right.has_value());
+  const auto other = OtherPlane(right->problem);
+  ASSERT_TRUE(other.has_value());
+  const Eigen::Vector3d true_way = walk.poses().back().translation.normalized();
+  EXPECT_LT(other->world_from_camera.back().translation.normalized().dot(true_way), 0.9);
+  const auto from_other = SolveStart(*other, kGoOn);
+  ASSERT_TRUE(from_other.has_value());
+  const Eigen::Vector3d way = from_other->problem.world_from_camera.back().translation;
+  EXPECT_GT(way.normalized().dot(true_way), 0.98);
+  EXPECT_NEAR(ScaleOf(*from_other, walk), 1.0, 3.0 * from_other->evidence.scale_sigma);
+}
+
+TEST(SolveStart, APlaneSeenFromNearlyOnePlaceIsNotDecided) {
+  Walk walk({0.0, 0.004, 0.03}, 0.02);
+  walk.Flatten({0.0, -0.77, -0.64}, 1.2);
+  const auto solution = SolveStart(walk.Problem(), kGoOn);
+  ASSERT_TRUE(solution.has_value());
+  EXPECT_LT(solution->evidence.margin, 4.5);
+}
+
+// Results repeat to the bit, whatever the heap looks like.
+TEST(SolveStart, AddressesDoNotMatter) {
+  Walk walk({0.2, 0.0, 0.0}, 0.1, 1, 0.01);
+  const StartProblem problem = walk.Problem();
+  std::mt19937_64 random(5);
+  std::vector<std::vector<char>> blocks;
+  std::optional<StartSolution> first;
+  for (int run = 0; run < 12; ++run) {
+    const auto solution = SolveStart(problem, kGoOn);
+    ASSERT_TRUE(solution.has_value());
+    if (!first) first = solution;
+    EXPECT_EQ(solution->problem.readout_s, first->problem.readout_s) << run;
+    EXPECT_EQ(solution->evidence.scale_sigma, first->evidence.scale_sigma) << run;
+    for (int k = 0; k < 200; ++k) blocks.emplace_back(1 + random() % 4000);
+    for (int k = 0; k < 100; ++k) blocks[random() % blocks.size()] = {};
+  }
 }
 
 TEST(SolveStart, ATurnOrACameraAtRestHoldsNoScale) {
