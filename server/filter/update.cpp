@@ -14,6 +14,21 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+constexpr int kYoung = 150;  // updates: every hint of depth is needed, and all may be wrong
+
+/// A read-out time is a constant of the camera: a frame that would move it by more than two of its
+/// sigmas is wrong about something else; a young map as a whole may be. `before`: covariance whose
+/// last row is the read-out's.
+bool Sudden(double error_s, const MatrixXd& before) {
+  constexpr double kSigmas = 2.0;
+  const double variance = before(before.rows() - 1, before.cols() - 1);
+  return error_s * error_s > kSigmas * kSigmas * variance;
+}
+
+}  // namespace
+
 /// Sparse measurement model of one frame: two rows an observation, three blocks
 /// each.
 struct FilterState::Linearised {
@@ -246,7 +261,6 @@ VectorXd FilterState::KeptShares(const std::vector<Turned>& turned) const {
   // However good matches are: a patch seen from elsewhere is off by 0.3 px and more, and always the
   // same way. A young map needs every hint of depth.
   constexpr double kBias = 0.5;  // of R
-  constexpr int kYoung = 150;    // updates
   const double noise_scale = std::max(noise_scale_, updates_ > kYoung ? kBias : 0.0);
   std::vector<double> kept;
   for (const Turned& each : turned) {
@@ -275,6 +289,7 @@ absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
   for (const Turned& each : turned) {
     ranges.insert(ranges.end(), each.ranges.begin(), each.ranges.end());
   }
+  if (readout_offset_ >= 0) ranges.push_back(readout_offset_);  // the last
   const MatrixXd before = covariance_.Among(ranges);
   const bool information = static_cast<int>(all->innovation.size()) > dim();
   Journal::Updated record;
@@ -283,7 +298,12 @@ absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
   if (!error.ok()) return error.status();
   JudgeNoise(report);
   // Partial update (README: parallax): inverse ranges take only a share of their gain.
-  const VectorXd kept = KeptShares(turned);
+  VectorXd kept = KeptShares(turned);
+  if (readout_offset_ >= 0) {
+    kept.conservativeResize(kept.size() + 1);
+    const bool sudden = updates_ > kYoung && Sudden((*error)[readout_offset_], before);
+    kept.tail<1>()[0] = sudden ? 1.0 : 0.0;
+  }
   for (std::size_t k = 0; k < ranges.size(); ++k) {
     const double taken = 1.0 - kept[static_cast<Eigen::Index>(k)];
     (*error)[ranges[k]] *= taken;
