@@ -318,22 +318,39 @@ async function cubeError({ expert, truth, camera }, { point }) {
   return found.length > CLEAR * wanted.length ? REACH_PX : undefined;
 }
 
-/** How many marks the page lists, once that number has stood for two seconds: edits may be on their way. */
-async function settledCount(expert) {
-  let count = -1;
+/** The marks that the page lists, once they have stood for two seconds: edits may be on their way. */
+async function settledIds(expert) {
+  let ids = [];
   for (let steady = 0, tries = 0; steady < 4 && tries < 40; ++tries) {
-    const now = (await expert.annotationIds()).length;
-    steady = now === count ? steady + 1 : 0;
-    count = now;
+    const now = (await expert.annotationIds()).sort();
+    steady = now.join() === ids.join() ? steady + 1 : 0;
+    ids = now;
     await sleep(500);
   }
-  return count;
+  return ids;
+}
+
+/** What one list has and the other has not, in words; 'the same' if nothing. */
+function difference(left, right) {
+  const lacking = left.filter((id) => !right.includes(id));
+  const added = right.filter((id) => !left.includes(id));
+  const words = (ids, word) => (ids.length > 0 ? [`${word} ${ids.join(' ')}`] : []);
+  return [...words(lacking, 'without'), ...words(added, 'besides')].join(', ') || 'the same';
+}
+
+/** The server's own list against the page's. */
+async function sameLists({ expert, annotations, check }, when) {
+  const page = await settledIds(expert);
+  const server = (await annotations.list({})).annotations.map(({ id }) => id);
+  const words = difference(server, page);
+  check(`the page lists what the server has, ${when}`, words === 'the same', words);
+  return server;
 }
 
 /** The server goes away and comes back: the page says so, and comes back by itself. */
 async function restart(context, start) {
   const { expert, check } = context;
-  const before = await settledCount(expert);
+  const before = await sameLists(context, 'before');
   context.truth.close();
   const stopMs = await context.server.stop();
   check('server stops on SIGTERM within 2 s', stopMs < 2000, `${stopMs.toFixed(0)} ms`);
@@ -351,11 +368,12 @@ async function restart(context, start) {
   );
   const pictureMs = performance.now() - begin;
   await expert.waitForStatus(/^tracking/, 60_000);
-  const after = await settledCount(expert);
+  const after = await sameLists(context, 'after');
   check(
     'reconnects by itself',
     liveMs < 5000,
     `live ${liveMs.toFixed(0)} ms, moving picture ${pictureMs.toFixed(0)} ms after the server was back`,
   );
-  check('annotations are back', after === before, `${after} of ${before}`);
+  const words = difference(before, after);
+  check('annotations are back', words === 'the same', `${before.length} before, ${words} after`);
 }

@@ -9,14 +9,35 @@ const RING_S = 10; // how long the server keeps a frame
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
+/**
+ * Freezes a picture whose camera is known, as a person would who sees the status: in another one nothing can
+ * be placed, and the page says so. A loaded computer loses the camera now and then.
+ */
+async function freeze({ expert, truth }, still) {
+  for (let tries = 0; ; ++tries) {
+    await expert.waitForStatus(/^tracking/, 60_000);
+    await expert.press('v');
+    await expert.press('p');
+    await still.waitFor({ timeout: 10_000 });
+    const id = Number(await still.getAttribute('data-frame-id'));
+    await expert.press('c');
+    const [first] = await placeOn(expert, truth.frame(id), 1);
+    await expert.press('v');
+    if (first && !first.refused) {
+      await expert.press('Control+z');
+      return id;
+    }
+    if (tries === 5) throw new Error(`no frame could be frozen: ${first?.refused ?? 'no object'}`);
+    await expert.press('p');
+    await sleep(1000);
+  }
+}
+
 export async function frozenPicture(context) {
   const { expert, session, annotations, truth, check } = context;
   await expert.enlarge('video');
-  await expert.press('v');
-  await expert.press('p');
   const still = expert.page.locator('canvas.still[data-lossless]');
-  await still.waitFor({ timeout: 10_000 });
-  const id = Number(await still.getAttribute('data-frame-id'));
+  const id = await freeze(context, still);
   const url = await still.evaluate((canvas) => canvas.toDataURL('image/png'));
   const kept = await session.getFrame({ frameId: BigInt(id), view: VideoView.RAW });
   const [shown, sent] = [decodePng(Buffer.from(url.split(',')[1], 'base64')), decodePng(kept.png)];
@@ -61,11 +82,11 @@ export async function frozenPicture(context) {
 }
 
 /** A cube on each of some objects that the frame shows. */
-async function placeOn(expert, frame) {
+async function placeOn(expert, frame, count = OBJECTS) {
   const { left, top, scale, width, height } = await expert.look();
   const placed = [];
   for (const object of frame.objects) {
-    if (placed.length === OBJECTS) break;
+    if (placed.length === count) break;
     if (!object.visible || !object.pixel) continue;
     const [u, v] = object.pixel;
     if (u < 30 || v < 30 || u > width - 30 || v > height - 30) continue;
