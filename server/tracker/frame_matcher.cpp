@@ -7,6 +7,7 @@
 #include <span>
 
 #include "server/tracker/group_consistency.hpp"
+#include "server/tracker/line_time.hpp"
 
 namespace saccade {
 namespace {
@@ -93,14 +94,13 @@ void HeedGroups(const CameraModel& camera, const FilterState& filter, const Land
   }
 }
 
-/// Rows are exposed one after the other: what is seen in row v is seen `late` read-outs after
+/// Rows are exposed one after the other: what is seen in one of them is seen `late` read-outs after
 /// mid-exposure, from a camera that has moved on with the present velocities.
-void BookRow(const CameraModel& camera, const CameraMotion& motion, double readout_s, double row,
-             LandmarkMatch& match) {
+void BookRow(const CameraModel& camera, const CameraMotion& motion, double readout_s,
+             const Eigen::Vector2d& pixel, LandmarkMatch& match) {
   Eigen::Matrix<double, 6, 1> velocities;
   velocities << motion.velocity_m_s, motion.angular_velocity_rad_s;
-  const double late = std::clamp((row + 0.5) / camera.height(), 0.0, 1.0) - 0.5;
-  match.d_readout = match.predicted.at.d_camera * velocities * late;
+  match.d_readout = match.predicted.at.d_camera * velocities * LateInReadouts(camera, pixel);
   match.row_shift = match.d_readout * readout_s;
 }
 
@@ -215,7 +215,7 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   match.found = match.hidden = false;
   match.weight = 0.0;
   if (!expected || !camera.InImage(expected->pixel, kBorder_px)) return;
-  BookRow(camera, motion, readout_s, expected->pixel.y(), match);
+  BookRow(camera, motion, readout_s, expected->pixel, match);
   match.pixel = expected->pixel + match.row_shift;
   const Eigen::Vector2d centre = match.pixel;
   const AnchoredPoint birth = FromBirth(landmark, match.point);
@@ -242,7 +242,7 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   match.searched = !match.hidden;
   if (!match.found) return;
   match.pixel = result.pixel;
-  BookRow(camera, motion, readout_s, result.pixel.y(), match);
+  BookRow(camera, motion, readout_s, result.pixel, match);
   match.noise = sigma * sigma * Eigen::Matrix2d::Identity() + result.covariance;
 }
 
@@ -291,7 +291,7 @@ void FrameMatcher::CatchUp(const CameraModel& camera, const FilterState& filter,
   if (matches.pose.inliers < kFewestForMotion) return;
   matches.motion = PresentMotion(filter, matches.pose.world_from_camera, step);
   for (LandmarkMatch& match : matches.in_view) {
-    if (match.found) BookRow(camera, matches.motion, filter.readout_s(), match.pixel.y(), match);
+    if (match.found) BookRow(camera, matches.motion, filter.readout_s(), match.pixel, match);
   }
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/tracker/line_time.hpp"
+
 namespace saccade {
 namespace {
 
@@ -137,8 +139,7 @@ std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vecto
   FeatureBirth birth;
   birth.id = map.NextId();
   // As seen in mid-exposure: the row's own pose is `late` from the clone's.
-  const double late =
-      filter.readout_s() * (std::clamp((pixel.y() + 0.5) / frame.camera->height(), 0.0, 1.0) - 0.5);
+  const double late = filter.readout_s() * LateInReadouts(*frame.camera, pixel);
   const Eigen::Vector3d gone =
       filter.camera().world_from_camera.rotation.conjugate() * motion.velocity_m_s * late;
   birth.bearing =

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "server/pipeline/stop_watch.hpp"
+#include "server/tracker/line_time.hpp"
 
 namespace saccade {
 namespace {
@@ -51,7 +52,7 @@ std::optional<StartFinder::Seen> StartFinder::See(const CameraModel& camera, Fea
   seen.pixel = pixel;
   const auto ray = camera.Unproject(pixel, &seen.d_bearing);
   if (!ray) return std::nullopt;
-  seen.late = std::clamp((pixel.y() + 0.5) / camera.height(), 0.0, 1.0) - 0.5;
+  seen.late = LateInReadouts(camera, pixel);
   seen.ray.ray = *ray;
   seen.ray.sigma_rad = sigma_px / (0.5 * (camera.intrinsics().fx + camera.intrinsics().fy));
   return seen;
