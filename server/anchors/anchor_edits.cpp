@@ -61,6 +61,15 @@ absl::Status AnchorManager::Place(const AnnotationTarget& target,
   place.distance_m = resolved->distance_m;
   place.seed = resolved->feature;
   place.seed_is_target = resolved->feature_is_target;
+  place.doubt = resolved->doubt;
+  if (resolved->view) {
+    const ResolvedTarget::View& view = *resolved->view;
+    place.clicked_from = view.world_from_camera.translation;
+    place.doubt_ray = (place.point - place.clicked_from).normalized();
+    if (place.doubt.surface == ClickSurface::kUnknown) {
+      place.look = {view.past.frame->id, view.pixel, view.depth_m};
+    }
+  }
   if (!place.seed && resolved->view && seed_) {
     const ResolvedTarget::View& view = *resolved->view;
     // The feature is to find the depth by itself: neighbours only tell it where to begin.

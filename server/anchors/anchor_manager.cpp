@@ -100,11 +100,19 @@ std::optional<AnchorMoved> AnchorManager::ResolveOne(bool map_corrected, AnchorR
 std::vector<AnchorMoved> AnchorManager::Resolve(std::shared_ptr<const MapSnapshot> snapshot,
                                                 const CameraModel& camera) {
   const bool corrected = newest_ && newest_->snapshot().map_revision != snapshot->map_revision;
-  newest_ = std::make_shared<const MapView>(std::move(snapshot));
+  scale_.Observe(*snapshot, camera.RadiansPerPixel());
+  trail_.Add(*snapshot);
+  newest_ = std::make_shared<const MapView>(std::move(snapshot), &scale_, &trail_);
   camera_ = camera;
   std::vector<AnchorMoved> moved;
   int selections_left = kSelectionsPerFrame;
+  bool looked = false;
   for (AnchorRecord& record : records_) {
+    AnchorPlace& place = record.place;
+    if (!looked && place.look) {
+      const double age_s = Seconds(newest_->snapshot().capture_time_ns - place.placed_ns);
+      looked = LookAgain(frames_, &trail_, newest_->snapshot(), age_s, place.look, place.doubt);
+    }
     if (std::optional<AnchorMoved> jump = ResolveOne(corrected, record, selections_left)) {
       moved.push_back(std::move(*jump));
     }

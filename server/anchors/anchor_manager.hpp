@@ -117,6 +117,8 @@ class AnchorManager {
   AnchorOptions options_;
   FrameLookup frames_;
   SeedFeatureFunction seed_;
+  ScaleChain scale_;
+  PoseTrail trail_;
   std::shared_ptr<const MapView> newest_;  // null before the first Resolve
   std::optional<CameraModel> camera_;
   std::vector<AnchorRecord> records_;  // oldest first

@@ -17,7 +17,7 @@ struct AnchorOptions {
   double plane_residual_m = 0.02;         // of a plane through neighbours, metric maps
   double plane_residual_relative = 0.01;  // the same, as a share of depth (any map)
   double median_depth_sigma = 0.3;        // share of depth
-  double click_sigma_px = 0.7;            // how well a person hits a pixel
+  double click_sigma_px = 0.3;            // of the clicked pixel's middle: half a pixel at most
   double tracking_sigma = 0.1;            // provisional until sigma / depth is below
   double pause_sigma_m = 0.05;            // "do not trust" above...
   double pause_sigma_relative = 0.02;     // ...unless below this share of the distance

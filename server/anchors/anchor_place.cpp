@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/anchors/anchor_claim.hpp"
 #include "server/anchors/rigid_fit.hpp"
 
 namespace saccade {
@@ -88,6 +89,8 @@ void ChangeBinding(const Rigid3& new_from_old, AnchorPlace& place) {
   if (place.seed_covariance) {
     place.seed_covariance = (r * *place.seed_covariance * r.transpose()).eval();
   }
+  place.doubt_ray = r * place.doubt_ray;
+  place.clicked_from = new_from_old * place.clicked_from;
 }
 
 /// Drops members that the map no longer holds; the fit of the others, one frame ago, is made to
@@ -121,7 +124,7 @@ void Replenish(const MapView& map, const AnchorOptions& options, AnchorPlace& pl
   const bool full = place.members.size() >= static_cast<std::size_t>(options.cluster_size);
   // Members stay in the map when they leave the filter: choices out of sight, or later ones, would
   // only take over what the map is wrong by at that moment.
-  const bool settled = place.was_tracking && (place.seen_s > kSettled_s || !IsSeen(map, place));
+  const bool settled = place.was_sure && (place.seen_s > kSettled_s || !IsSeen(map, place));
   if (full && (settled || selections_left <= 0 ||
                std::abs(now_ns - place.last_selected_ns) < kReselectNs)) {
     return;
@@ -151,30 +154,30 @@ void Replenish(const MapView& map, const AnchorOptions& options, AnchorPlace& pl
   place.world_from_binding = fitted;
 }
 
-/// Covariance of a fixed world point seen from the camera, from the pose alone.
-Eigen::Matrix3d PoseCovarianceAt(const MapSnapshot& snapshot, const Eigen::Vector3d& point) {
-  const Eigen::Matrix3d camera_from_world = snapshot.world_from_camera.RotationMatrix().transpose();
-  Eigen::Matrix<double, 3, 6> jacobian;
-  jacobian.leftCols<3>() = -camera_from_world;
-  jacobian.rightCols<3>() = Skew(snapshot.world_from_camera.Inverse() * point);
-  return jacobian * snapshot.pose_covariance * jacobian.transpose();
-}
-
 /// What the cluster says about the anchor, the click's own uncertainty included.
 PlaceEstimate FromCluster(const MapView& map, const AnchorPlace& place) {
   const MapSnapshot& snapshot = map.snapshot();
   PlaceEstimate estimate;
   estimate.point_in_world = place.world_from_binding * place.clicked_point;
-  double total = 0;
+  double total = 0, at_rest = 0, turn_variance = 0;
   for (const ClusterMember& member : place.members) {
     const FeatureSnapshot& feature = *map.Find(member.id);
     estimate.covariance_in_world += member.weight * feature.covariance_in_world;
     estimate.covariance_in_camera += member.weight * feature.covariance_in_camera;
     total += member.weight;
+    if (IsAtRest(feature)) {
+      at_rest += member.weight;
+      turn_variance += member.weight * TurnVariance(snapshot, feature);
+    }
   }
   if (total > 0) {
     estimate.covariance_in_world /= total;
     estimate.covariance_in_camera /= total;
+    if (at_rest > 0) {  // it knows nothing of the camera's own error
+      estimate.covariance_in_camera +=
+          at_rest / total *
+          RestCovarianceAt(snapshot, estimate.point_in_world, turn_variance / at_rest);
+    }
   } else {
     estimate.covariance_in_camera = PoseCovarianceAt(snapshot, estimate.point_in_world);
   }
@@ -204,7 +207,9 @@ PlaceEstimate WithSeed(const MapView& map, const FeatureSnapshot& seed, PlaceEst
   if (!place.seed_is_target && !consistent && !mature) return estimate;
   if (!gain.allFinite()) return estimate;
   estimate.point_in_world += world_from_camera * gain * difference;
-  const bool better = seed.covariance_in_camera.trace() < prior.trace();
+  // While nobody has seen whether the click is on an outline, its patch may be half one thing, half
+  // another: it moves the mark, but vouches for nothing.
+  const bool better = !AwaitsLook(map, place) && seed.covariance_in_camera.trace() < prior.trace();
   if (better || place.seed_is_target || !consistent) {
     estimate.covariance_in_camera = seed.covariance_in_camera;
     estimate.covariance_in_world = seed.covariance_in_world;
@@ -225,7 +230,9 @@ void ForgetSeed(AnchorPlace& place) {
 
 }  // namespace
 
-MapView::MapView(std::shared_ptr<const MapSnapshot> snapshot) : snapshot_(std::move(snapshot)) {
+MapView::MapView(std::shared_ptr<const MapSnapshot> snapshot, const ScaleChain* scale,
+                 const PoseTrail* trail)
+    : snapshot_(std::move(snapshot)), scale_(scale), trail_(trail) {
   const std::vector<FeatureSnapshot>& features = snapshot_->features;
   for (std::size_t k = 0; k < features.size(); ++k) {
     if (k == 0 || features[k].id <= features[k - 1].id) stretches_.push_back(k);
@@ -261,7 +268,7 @@ PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPla
     member.last_in_world = map.Find(member.id)->point_in_world;
   }
 
-  if (place.was_tracking && IsSeen(map, place)) place.seen_s += std::min(dt, kLongestStep_s);
+  if (place.was_sure && IsSeen(map, place)) place.seen_s += std::min(dt, kLongestStep_s);
   if (place.placed_ns == 0) place.placed_ns = now_ns;
   PlaceEstimate estimate = FromCluster(map, place);
   if (place.seed) {
@@ -286,6 +293,9 @@ PlaceEstimate Follow(const MapView& map, const AnchorOptions& options, AnchorPla
   const Eigen::Vector3d lag_in_camera = map.snapshot().world_from_camera.rotation.conjugate() * lag;
   estimate.covariance_in_world += lag * lag.transpose();
   estimate.covariance_in_camera += lag_in_camera * lag_in_camera.transpose();
+  NoteSure(map, options, estimate, place);
+  AddScale(map, place, estimate);
+  AddDoubt(map, place, estimate);
   return estimate;
 }
 

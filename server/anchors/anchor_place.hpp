@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "server/anchors/anchor_options.hpp"
+#include "server/anchors/depth_doubt.hpp"
+#include "server/anchors/scale_chain.hpp"
 #include "shared/geometry/rigid3.hpp"
 #include "shared/scene/annotation.hpp"
 #include "shared/scene/map_snapshot.hpp"
@@ -16,13 +18,21 @@ namespace saccade {
 /// A snapshot whose features are found by id in constant time; made once per frame.
 class MapView {
  public:
-  explicit MapView(std::shared_ptr<const MapSnapshot> snapshot);
+  /// `scale`: how surely its parts have one scale; null: surely. `trail`: of the frames before;
+  /// null: not known. Both outlive the view.
+  explicit MapView(std::shared_ptr<const MapSnapshot> snapshot, const ScaleChain* scale = nullptr,
+                   const PoseTrail* trail = nullptr);
   const MapSnapshot& snapshot() const { return *snapshot_; }
   /// Null if the map does not hold it (any more).
   const FeatureSnapshot* Find(FeatureId id) const;
+  const PoseTrail* trail() const { return trail_; }
+  /// Variance of the logarithm of the scale around a feature.
+  double ScaleVariance(FeatureId id) const { return scale_ ? scale_->Of(id) : 0.0; }
 
  private:
   std::shared_ptr<const MapSnapshot> snapshot_;
+  const ScaleChain* scale_;
+  const PoseTrail* trail_;
   /// Begins of the stretches of rising ids: the tracker's lists are two. No index of all features
   /// for every frame: most of a large map rests, and few are asked for.
   std::vector<std::size_t> stretches_;
@@ -54,6 +64,10 @@ struct AnchorPlace {
   std::optional<FeatureId> seed;  // feature at the very pixel; refines the point as it converges
   bool seed_seen = false;         // a new one is in the map from the next frame on
   bool seed_is_target = false;    // the feature itself was chosen
+  DepthDoubt doubt;               // of what was clicked, along `doubt_ray`
+  Eigen::Vector3d doubt_ray = Eigen::Vector3d::Zero();     // in binding, unit; zero: there is none
+  Eigen::Vector3d clicked_from = Eigen::Vector3d::Zero();  // the camera then, in binding [m]
+  std::optional<ClickLook> look;  // until it is known whether the click is on an outline
 
   Rigid3 world_from_binding;
   /// The seeded feature's own covariance while it was the better witness, in binding [m^2].
@@ -61,6 +75,7 @@ struct AnchorPlace {
   Timestamp placed_ns = 0;
   Timestamp last_selected_ns = 0;  // members were last compared with the rest of the map
   bool was_tracking = false;       // has been sure once: now never PROVISIONAL again
+  bool was_sure = false;           // the same, by its members and its click alone
   double seen_s = 0;               // since then a member was measured for so long
   bool paused = false;             // by its own error (hysteresis)
   Timestamp above_ns = 0;          // while paused: when that was last above its limit
@@ -72,6 +87,8 @@ struct PlaceEstimate {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
   Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // [m^2]
   Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // camera pose included [m^2]
+  double scale_sigma_m = 0;    // of it, by the scale of that part of the map
+  double outline_sigma_m = 0;  // of it, because it is on an outline
 };
 
 /// Carries `place` to this frame: fits the members' motion, replaces those that the map dropped

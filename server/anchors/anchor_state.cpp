@@ -8,6 +8,7 @@
 #include <cmath>
 #include <span>
 
+#include "server/anchors/anchor_claim.hpp"
 #include "shared/scene/length_text.hpp"
 
 namespace saccade {
@@ -30,12 +31,6 @@ void DescribePixel(const MapView& map, const CameraModel& camera, const PlaceEst
   const double spread = std::hypot(0.5 * (s(0, 0) - s(1, 1)), s(0, 1));
   anchor.pixel = pixel;
   anchor.error_px = std::sqrt(std::max(0.0, middle + spread));
-}
-
-double PauseLimit(const MapSnapshot& snapshot, const AnchorOptions& options,
-                  const AnchorPlace& place) {
-  if (!snapshot.metric) return options.pause_sigma_no_scale * place.distance_m;
-  return std::max(options.pause_sigma_m, options.pause_sigma_relative * place.distance_m);
 }
 
 /// An expected error, and what it may be.
@@ -108,7 +103,13 @@ std::string TrackerTrouble(TrackingStatus status) {
 }
 
 /// What makes an anchor's depth better known; where nothing can, that it has to be placed again.
-std::string Remedy(const AnchorPlace& place) {
+std::string Remedy(const AnchorPlace& place, const PlaceEstimate& estimate, double error_m) {
+  if (estimate.outline_sigma_m > 0.7 * error_m) {
+    return "it is on an outline; place it again beside it";
+  }
+  if (estimate.scale_sigma_m > 0.7 * error_m) {
+    return "its distance is not sure; turn slowly between here and where the map began";
+  }
   const bool guessed = place.method == AnchorMethod::kMedianDepth && !place.seed;
   if (place.was_tracking) return "look at it from nearby";
   return guessed ? "its depth is a guess; place it again on something that the map has"
@@ -116,7 +117,7 @@ std::string Remedy(const AnchorPlace& place) {
 }
 
 std::string PausedReason(const MapSnapshot& snapshot, const Excess& metres, const Excess& pixels,
-                         const AnchorPlace& place) {
+                         const AnchorPlace& place, const PlaceEstimate& estimate) {
   if (!metres.above && !pixels.above) {
     const bool by_metres = metres.error * pixels.limit >= pixels.error * metres.limit;
     return absl::StrCat(
@@ -131,15 +132,15 @@ std::string PausedReason(const MapSnapshot& snapshot, const Excess& metres, cons
   return absl::StrCat(
       "expected error ",
       metres.above ? Compare(metres, snapshot, place) : Compare(pixels.error, pixels.limit, "px"),
-      ": ", Remedy(place));
+      ": ", Remedy(place, estimate, metres.error));
 }
 
 std::string ProvisionalReason(double relative, const AnchorOptions& options,
-                              const AnchorPlace& place) {
+                              const AnchorPlace& place, const PlaceEstimate& estimate) {
   if (!HasNearMember(place)) return "no mapped feature is near it yet: look around there";
   if (relative < options.tracking_sigma) return "";
   return absl::StrCat("its depth is known to ", absl::StrFormat("%.0f %%: ", 1e2 * relative),
-                      Remedy(place));
+                      Remedy(place, estimate, relative * place.distance_m));
 }
 
 }  // namespace
@@ -169,10 +170,10 @@ Anchor DescribeAnchor(const MapView& map, const CameraModel& camera, const Ancho
     anchor.reason = trouble;
   } else if (place.paused) {  // new ones, too: who is above the limit is not to be trusted
     anchor.state = AnchorState::kPaused;
-    anchor.reason = PausedReason(snapshot, metres, pixels, place);
+    anchor.reason = PausedReason(snapshot, metres, pixels, place, estimate);
   } else if (!place.was_tracking) {
     anchor.state = AnchorState::kProvisional;
-    anchor.reason = ProvisionalReason(relative, options, place);
+    anchor.reason = ProvisionalReason(relative, options, place, estimate);
   } else {
     anchor.state = AnchorState::kTracking;
   }

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <variant>
 
-#include "server/anchors/depth_probe.hpp"
 #include "server/anchors/local_surface.hpp"
 #include "server/anchors/rigid_fit.hpp"
 
@@ -116,16 +115,6 @@ Rigid3 RayFromWorld(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray_in
   return world_from_ray.Inverse();
 }
 
-/// The picture's own word on the depth. Where it contradicts the neighbours it wins: they may lie
-/// on what is behind.
-void AskThePicture(const PastFrame& past, const Eigen::Vector2d& pixel, FrameId newest,
-                   const FrameLookup& frames, SurfaceDepth& depth) {
-  const auto probed = ProbeDepth(past, pixel, depth.depth_m, newest, frames);
-  if (!probed) return;
-  JoinDepth(*probed, depth.depth_m, depth.sigma_m);
-  depth.at_feature.reset();
-}
-
 absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const FrameLookup& frames,
                                             const MapView& newest, const AnchorOptions& options) {
   if (!target.pixel.allFinite()) return CheckPixel(target, CameraModel());
@@ -154,11 +143,10 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
   std::optional<SurfaceDepth> depth =
       EstimateDepth(samples, camera.RadiansPerPixel(), newest.snapshot().metric, options);
   if (!depth) return NoDepth();
-  if (!depth->at_feature) {
-    AskThePicture(*past, target.pixel, newest.snapshot().frame_id, frames, *depth);
-  }
 
   ResolvedTarget resolved;
+  resolved.doubt = AskThePicture(*past, target.pixel, newest.snapshot().frame_id, frames,
+                                 newest.trail(), *depth);
   resolved.method = depth->method;
   resolved.distance_m = depth->depth_m;
   resolved.point_in_world = world_from_camera.translation + depth->depth_m * ray;

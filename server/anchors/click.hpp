@@ -31,6 +31,7 @@ struct ResolvedTarget {
     Eigen::Vector3d normal_in_world = Eigen::Vector3d::Zero();  // of the surface, unit
   };
   std::optional<View> view;
+  DepthDoubt doubt;  // of a pixel: the surface may be another
 };
 
 /// Carries a transform from the map as `before` had it to the newest map: world frames differ by

@@ -10,7 +10,6 @@
 namespace saccade {
 namespace {
 
-constexpr FrameId kLookBack = 270;                 // frames
 constexpr FrameId kStride = 6;                     // frames between those that are considered
 constexpr std::size_t kMostViews = 12;             // that see it most from beside...
 constexpr std::size_t kFewestViews = 4;            // ...and how many a range needs
@@ -23,12 +22,6 @@ constexpr double kLeastDeviation = 4.0;  // of the patch [grey levels]: sensor n
 constexpr double kGoodScore = 0.75;      // mean correlation
 constexpr double kLead = 0.10;           // over any other range
 constexpr double kLargestSigma = 0.06;   // of the range
-
-struct View {
-  const PastFrame* past = nullptr;
-  Rigid3 view_from_clicked;
-  double parallax_px = 0.0;
-};
 
 double Correlation(const CorrelationTemplate& look, const cv::Mat& seen) {
   const int size = look.size;
@@ -49,34 +42,17 @@ double Correlation(const CorrelationTemplate& look, const cv::Mat& seen) {
   return (cross - sum * static_cast<double>(look.sum) / n) / std::sqrt(variance * own);
 }
 
-bool IsTracked(const MapSnapshot& snapshot) { return snapshot.status == TrackingStatus::kTracking; }
-
 class Sweep {
  public:
   Sweep(const PastFrame& clicked, PatchTemplate patch, double guess_m)
       : clicked_(clicked), patch_(std::move(patch)), guess_m_(guess_m) {}
 
-  void Gather(FrameId newest, const FrameLookup& frames) {
-    const FrameId first = newest > kLookBack ? newest - kLookBack : 0;
-    for (FrameId id = newest; id >= first; id -= std::min(id, kStride)) {
-      if (absl::StatusOr<PastFrame> past = frames(id); past.ok())
-        pasts_.push_back(*std::move(past));
-      if (id == 0) break;
-    }
-    const MapSnapshot& then = *clicked_.snapshot;
-    const double focal_px = clicked_.frame->camera->intrinsics().fx;
-    for (const PastFrame& past : pasts_) {
-      if (!IsTracked(*past.snapshot) || past.snapshot->map_generation != then.map_generation)
-        continue;
-      View view{&past, past.snapshot->world_from_camera.Inverse() * then.world_from_camera, 0.0};
-      const Eigen::Vector3d base = view.view_from_clicked.Inverse().translation;
-      view.parallax_px = focal_px * base.cross(patch_.birth_bearing).norm() / guess_m_;
-      if (view.parallax_px < kLeastParallax_px || view.parallax_px > kMostParallax_px) continue;
-      views_.push_back(view);
-    }
-    std::sort(views_.begin(), views_.end(),
-              [](const View& a, const View& b) { return a.parallax_px > b.parallax_px; });
-    if (views_.size() > kMostViews) views_.resize(kMostViews);
+  void Gather(FrameId newest, const FrameLookup& frames, const PoseTrail* trail) {
+    views_ = ViewsFromBeside(clicked_, patch_.birth_bearing, guess_m_, newest, frames, trail,
+                             {.stride = kStride,
+                              .most = kMostViews,
+                              .least_parallax_px = kLeastParallax_px,
+                              .most_parallax_px = kMostParallax_px});
   }
 
   std::size_t views() const { return views_.size(); }
@@ -89,8 +65,8 @@ class Sweep {
     options.min_deviation = kLeastDeviation;
     double sum = 0.0;
     std::size_t seen = 0;
-    for (const View& view : views_) {
-      const CameraModel& camera = *view.past->frame->camera;
+    for (const BesideView& view : views_) {
+      const CameraModel& camera = *view.past.frame->camera;
       const Eigen::Vector3d point = view.view_from_clicked * (patch_.birth_bearing / inverse_range);
       const auto pixel = point.z() > 0.0 ? camera.Project(point) : std::nullopt;
       if (!pixel || !camera.InImage(*pixel, options.size)) continue;
@@ -98,7 +74,7 @@ class Sweep {
                     Eigen::Vector3d::Zero(), camera, *pixel, options, warped_) != WarpStatus::kOk) {
         continue;
       }
-      cv::getRectSubPix(view.past->frame->grey, {options.size, options.size},
+      cv::getRectSubPix(view.past.frame->grey, {options.size, options.size},
                         {static_cast<float>(pixel->x()), static_cast<float>(pixel->y())}, rect_,
                         CV_32F);
       sum += std::max(0.0, Correlation(warped_.fine, rect_));
@@ -111,8 +87,7 @@ class Sweep {
   const PastFrame& clicked_;
   PatchTemplate patch_;
   double guess_m_;
-  std::vector<PastFrame> pasts_;
-  std::vector<View> views_;
+  std::vector<BesideView> views_;
   WarpedPatch warped_;
   cv::Mat rect_;
 };
@@ -120,12 +95,14 @@ class Sweep {
 }  // namespace
 
 std::optional<ProbedDepth> ProbeDepth(const PastFrame& clicked, const Eigen::Vector2d& pixel,
-                                      double guess_m, FrameId newest, const FrameLookup& frames) {
-  if (!(guess_m > 0.0) || !IsTracked(*clicked.snapshot)) return std::nullopt;
+                                      double guess_m, FrameId newest, const FrameLookup& frames,
+                                      const PoseTrail* trail) {
+  if (!(guess_m > 0.0) || clicked.snapshot->status != TrackingStatus::kTracking)
+    return std::nullopt;
   absl::StatusOr<PatchTemplate> patch = CutPatch(clicked.frame->grey, pixel, clicked.frame->camera);
   if (!patch.ok()) return std::nullopt;
   Sweep sweep(clicked, *std::move(patch), guess_m);
-  sweep.Gather(newest, frames);
+  sweep.Gather(newest, frames, trail);
   if (sweep.views() < kFewestViews) return std::nullopt;
   const double low = 1.0 / (kFarthest * guess_m), high = 1.0 / (kNearest * guess_m);
   const double step = (high - low) / (kSteps - 1);

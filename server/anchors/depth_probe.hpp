@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "server/anchors/frame_ring.hpp"
+#include "server/anchors/beside_views.hpp"
 
 namespace saccade {
 
@@ -20,7 +20,8 @@ struct ProbedDepth {
 /// Nothing if the patch has no texture, the camera did not move sideways, or no single range stands
 /// out. Uses the poses that the tracker published with each frame. Any thread.
 std::optional<ProbedDepth> ProbeDepth(const PastFrame& clicked, const Eigen::Vector2d& pixel,
-                                      double guess_m, FrameId newest, const FrameLookup& frames);
+                                      double guess_m, FrameId newest, const FrameLookup& frames,
+                                      const PoseTrail* trail = nullptr);
 
 /// Joins it with an earlier estimate: the weighted mean if both agree, else the probe alone.
 void JoinDepth(const ProbedDepth& probed, double& range_m, double& sigma_m);

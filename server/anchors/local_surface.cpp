@@ -260,6 +260,11 @@ std::optional<SurfaceDepth> EstimateDepth(const std::vector<SurfaceSample>& samp
           std::hypot(depth.sigma_m, 0.3 * std::abs(depth.depth_m - 1.0 / plane->coefficients(0)));
     } else {
       depth.sigma_m = std::hypot(depth.sigma_m, std::sqrt(finder.AmbiguityVariance(*plane)));
+      const auto on_plane = [&](const InverseDepthSample& sample) {
+        return sample.depth_known && finder.Chi2(*plane, sample) <= 9.0;
+      };
+      const auto first = std::find_if(near.begin(), near.end(), on_plane);  // nearest first
+      depth.nearest_rad = first == near.end() ? kRadiusRad : first->radius;
       if (nearest_px < kAtFeaturePx) depth.at_feature = nearest->index;
     }
     return depth;

@@ -24,6 +24,7 @@ struct SurfaceDepth {
   double sigma_m = 0;
   Eigen::Vector3d normal_in_ray = -Eigen::Vector3d::UnitZ();  // unit, towards the camera
   std::optional<std::size_t> at_feature;  // index of a sample that lies at the very pixel (3 px)
+  double nearest_rad = 0;  // of a plane: from the ray to the nearest feature known to lie on it
 };
 
 /// Finds the depth along a ray from the features round it, best first:

@@ -19,8 +19,9 @@ struct DormantLandmark {
   Landmark landmark;
   double inverse_range_sigma = 1.0;                               // from its first keyframe [1/m]
   Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  // when it left [m^2]
-  std::int64_t rests_until = 0;                                   // frame
-  int failures = 0;  // times that it was woken and not seen
+  std::uint64_t home = 0;        // clone that its covariance is counted from
+  std::int64_t rests_until = 0;  // frame
+  int failures = 0;              // times that it was woken and not seen
   /// Where the keyframe graph had it when it was last asked (Locate).
   struct Place {
     std::uint64_t version = 0;  // of its keyframe; 0: never asked

@@ -52,6 +52,7 @@ void Tracker::Impl::Rest(std::span<const FeatureId> ids) {
     dormant.failures = Failures(*landmark);
     dormant.inverse_range_sigma = marginal.inverse_range_sigma;
     dormant.covariance_in_world = marginal.covariance_in_world;
+    dormant.home = home_;
     dormant.rests_until = failed ? frames_ + kPause : 0;
     // What was woken in vain has taught the filter nothing.
     if (!failed) refiner_.Rest(id, filter_);
@@ -136,10 +137,13 @@ void Tracker::Impl::PublishDormant(MapSnapshot& snapshot) const {
     feature.id = id;
     feature.matched_count = dormant.landmark.matched;
     feature.point_in_world = dormant.place.point_in_world;
-    // As well as it was known, and its keyframe as well as it will be when it is woken.
-    const double off = options_.wake_position_share * dormant.place.range_m;
-    feature.covariance_in_world =
-        dormant.covariance_in_world + off * off * Eigen::Matrix3d::Identity();
+    // As well as it was known. While errors are counted from the same place as then that is all;
+    // later its keyframe is as well known as it will be when it is woken.
+    feature.covariance_in_world = dormant.covariance_in_world;
+    if (dormant.home != home_) {
+      const double off = options_.wake_position_share * dormant.place.range_m;
+      feature.covariance_in_world += off * off * Eigen::Matrix3d::Identity();
+    }
     feature.covariance_in_camera = turn * feature.covariance_in_world * turn.transpose();
     feature.depth_known = true;
   }

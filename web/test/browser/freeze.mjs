@@ -69,11 +69,20 @@ export async function frozenPicture(context) {
       const depth = inCamera(frame.world_from_camera, object.point_in_world_m)[2];
       return at ? length(minus([at.x, at.y, at.z], object.point_in_world_m)) / depth : Infinity;
     });
+    const claimed = ids.map(({ key, object }) => {
+      const depth = inCamera(frame.world_from_camera, object.point_in_world_m)[2];
+      return (known.get(key)?.errorMm ?? 0) / 1000 / depth;
+    });
     const refused = ids.find((entry) => entry.refused)?.refused;
     check(
       `clicks in the frozen picture${gone ? ` after ${RING_S} s` : ''}, median error below 2 % of depth`,
       errors.length > 0 && median(errors) < 0.02,
       refused ?? errors.map((e, i) => `${ids[i].object.name} ${(100 * e).toFixed(2)} %`).join(', '),
+    );
+    check(
+      `a click in the frozen picture${gone ? ` after ${RING_S} s` : ''} that is off says so`,
+      errors.every((error, i) => error < Math.max(0.02, 3 * claimed[i])),
+      claimed.map((c, i) => `${ids[i].object.name} claims ${(100 * c).toFixed(2)} %`).join(', '),
     );
     for (let i = 0; i < ids.length; ++i) await expert.press('Control+z'); // leaves the room as it was
     await sleep(500);

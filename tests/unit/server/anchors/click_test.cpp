@@ -122,6 +122,25 @@ TEST(Click, NearAFeatureOnAnotherSurfaceTakesThePlaneUnderTheClick) {
   EXPECT_LT((edit->annotation.anchor.point_in_world - truth).norm(), 0.02 * truth.norm());
 }
 
+/// A wall at 1 m whose features begin so far from the ray.
+SurfaceDepth WallKnownFrom(double radius_rad) {
+  std::vector<SurfaceSample> samples;
+  for (int k = 0; k < 12; ++k) {
+    const double turn = k * M_PI / 6, radius = radius_rad * (1 + k % 2);
+    samples.push_back({{radius * std::cos(turn), radius * std::sin(turn), 1.0}, 0.002, true, 1.0});
+  }
+  return *EstimateDepth(samples, 1.0 / 500, /*metric=*/true, AnchorOptions());
+}
+
+TEST(Click, APlaneIsTheLessWhatWasClickedTheFartherItsFeaturesAre) {
+  const SurfaceDepth near = WallKnownFrom(0.005), far = WallKnownFrom(0.1);
+  EXPECT_EQ(near.method, AnchorMethod::kPlane);
+  EXPECT_EQ(far.method, AnchorMethod::kPlane);
+  EXPECT_LT(far.sigma_m, 0.01) << "the wall is as well known...";
+  EXPECT_NEAR(near.nearest_rad, 0.005, 1e-6);
+  EXPECT_NEAR(far.nearest_rad, 0.1, 1e-6) << "...but a mug before it would not be";
+}
+
 TEST(Click, RefusesWhatCannotBeResolved) {
   Rig rig;
   EXPECT_EQ(rig.Click(1, {10, 10}).status().code(), absl::StatusCode::kFailedPrecondition);

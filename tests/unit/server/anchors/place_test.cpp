@@ -51,6 +51,34 @@ TEST(Place, T29FollowsRandomMapCorrections) {
   EXPECT_LT(rms, 0.015);
 }
 
+TEST(Place, WhatIsAtRestDoesNotHideTheCamerasOwnError) {
+  const auto claim = [](double pose_sigma_rad) {
+    auto snapshot = std::make_shared<MapSnapshot>();
+    snapshot->status = TrackingStatus::kTracking;
+    snapshot->map_generation = 1;
+    snapshot->metric = true;
+    snapshot->pose_covariance.diagonal().tail<3>().setConstant(pose_sigma_rad * pose_sigma_rad);
+    for (int k = 0; k < 8; ++k) {  // behind the wearer, as the map remembers them
+      FeatureSnapshot feature;
+      feature.id = k + 1;
+      feature.point_in_world = {0.2 * (k % 4), 0.2 * (k / 4), -3};
+      feature.covariance_in_world = 1e-6 * Eigen::Matrix3d::Identity();
+      feature.covariance_in_camera = feature.covariance_in_world;
+      feature.depth_known = true;
+      snapshot->features.push_back(feature);
+    }
+    AnchorPlace place;
+    place.attached = true;
+    place.map_generation = 1;
+    place.point = place.clicked_point = {0.1, 0.1, -3};
+    int selections = 1;
+    return std::sqrt(
+        Follow(MapView(snapshot), AnchorOptions(), place, selections).covariance_in_camera.trace());
+  };
+  EXPECT_LT(claim(0), 0.005);
+  EXPECT_GT(claim(0.01), 0.03) << "a camera that is turned by 1 % draws it 3 cm off";
+}
+
 TEST(Place, LosingFeaturesNeverMovesTheAnchor) {
   Rig rig;
   const Rigid3 pose = LookFrom({0, 0, 0}, 0, 0.2);
