@@ -81,7 +81,7 @@ class ViewEncoder {
   std::uint64_t sequence_ = 0;
   Timestamp key_ns_ = 0;
   Timestamp rate_told_ns_ = 0;
-  int coded_ = 0;  // since then
+  int coded_ = 0;        // since then
   bool failed_ = false;  // said so once
 
   Runner<TrackedFrame> runner_;  // last

@@ -127,6 +127,7 @@ class VideoEncoder::Impl {
   void SetFrameRate(double fps_hz) {
     constexpr double kSlowest = 1.0 / 6.0;
     constexpr double kAsGood = 0.15;  // so much off it stays: rate control begins anew with each
+    if (!std::isfinite(fps_hz)) return;
     const double wanted = std::clamp(fps_hz, kSlowest * options_.fps_hz, options_.fps_hz);
     if (std::abs(wanted - fps_hz_) <= kAsGood * fps_hz_) return;
     auto rate = static_cast<float>(wanted);
