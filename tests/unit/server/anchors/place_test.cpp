@@ -197,7 +197,7 @@ TEST_F(SeededClick, ProvisionalBecomesTrackingAlongTheClickedRayWithoutAJump) {
   EXPECT_EQ(rig_.Only().anchor.state, AnchorState::kTracking) << rig_.Only().anchor.reason;
   EXPECT_LT((before - truth).norm(), 0.02);
   const double best_error = rig_.Only().anchor.error_m;
-  EXPECT_LT(best_error, 0.03);
+  EXPECT_LT(best_error, 0.04);  // no picture has ruled out an outline: 12 px of relief
 
   // The map drops the seed: what it taught stays.
   rig_.map.Remove(seed_);
