@@ -8,7 +8,6 @@
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <type_traits>
 #include <utility>
 
 #include "server/app/crop_view.hpp"
@@ -32,16 +31,13 @@ constexpr int kCodeEveryS = 60;  // and after 1, 2, 4 ... seconds, while the sta
 
 }  // namespace
 
-Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source,
-               std::unique_ptr<FrameTracker> tracker, EventSink& sink)
+Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, EventSink& sink)
     : options_(std::move(options)),
       facts_{options_.version, source->info().uri, source->info().camera},
       sink_(sink),
       source_(std::move(source)),
-      tracker_(std::move(tracker)),
       inbox_(options_.mailbox),
       clock_(/*paced=*/!options_.every_frame),
-      upright_(source_->info().target.has_value()),
       stills_({.capacity = kStillsWaiting, .when_full = WhenFull::kRefuse},
               [this](StillRequest request) { MakeStill(std::move(request)); }) {
   if (options_.mount) {
@@ -62,24 +58,14 @@ Engine::~Engine() { Stop(); }
 absl::StatusOr<std::unique_ptr<Engine>> Engine::Create(EngineOptions options,
                                                        std::unique_ptr<FrameSource> source,
                                                        std::unique_ptr<FrameTracker> tracker,
-                                                       std::unique_ptr<AnnotationStore> store,
+                                                       std::unique_ptr<AnnotationJournal> journal,
                                                        EventSink& sink) {
-  if (source->info().target && options.anchors.world_key.empty()) {
-    options.anchors.world_key = WorldKey(*source->info().target);
-  }
-  const AnchorOptions anchors = options.anchors;
-  auto engine = std::unique_ptr<Engine>(
-      new Engine(std::move(options), std::move(source), std::move(tracker), sink));
-  Engine* self = engine.get();
-  absl::StatusOr<std::unique_ptr<AnnotationBook>> book = AnnotationBook::Open(
-      anchors, [self](FrameId id) { return self->ring_.Find(id, FrameRing::Want::kGrey); },
-      [self](const Frame& frame, const Rigid3& world_from_camera, const Eigen::Vector2d& pixel,
-             double depth_m, double sigma_m) {
-        return self->tracker_->SeedFeature(frame, world_from_camera, pixel, depth_m, sigma_m);
-      },
-      std::move(store), [self] { self->inbox_.PutNewestIfEmpty({}); });
-  if (!book.ok()) return book.status();
-  engine->book_ = *std::move(book);
+  auto engine = std::unique_ptr<Engine>(new Engine(std::move(options), std::move(source), sink));
+  absl::StatusOr<std::unique_ptr<Wearable>> wearable = Wearable::Create(
+      engine->source_->info(), std::move(tracker), engine->options_.anchors, std::move(journal),
+      [self = engine.get()] { self->inbox_.PutNewestIfEmpty({}); });
+  if (!wearable.ok()) return wearable.status();
+  engine->wearable_ = *std::move(wearable);
   return engine;
 }
 
@@ -108,15 +94,10 @@ void Engine::Stop() {
   }
   stills_.Stop();
   for (const auto& view : views_) view->Stop();
-  const std::lock_guard lock(book_gone_mutex_);
-  book_ = nullptr;  // commits what is queued and answers it
+  wearable_->Close();  // commits what is queued and answers it
 }
 
-absl::Status Engine::FlushStore(std::chrono::milliseconds limit) {
-  const std::unique_lock lock(book_gone_mutex_, limit);
-  if (!lock) return absl::UnavailableError("the data base is still being written");
-  return book_ ? book_->Flush(limit) : absl::OkStatus();
-}
+absl::Status Engine::FlushStore(std::chrono::milliseconds limit) { return wearable_->Flush(limit); }
 
 void Engine::RunSource(std::stop_token stop) {
   while (!stop.stop_requested()) {
@@ -137,7 +118,7 @@ void Engine::RunSource(std::stop_token stop) {
 
 void Engine::RunTracker(std::stop_token stop) {
   while (auto batch = inbox_.Wait(stop)) {
-    for (Command& command : batch->commands) Execute(std::move(command));
+    for (Command& command : batch->commands) wearable_->Execute(std::move(command));
     const bool frame = batch->item && batch->item->frame;
     if (frame) {
       Track(*std::move(batch->item->frame));
@@ -158,21 +139,19 @@ void Engine::Track(Frame frame) {
     const std::shared_ptr<const GazeSnapshot> state = gaze_->snapshot();
     if (state->calibration && state->calibration->running) frame.mount.reset();
   }
-  auto shared = std::make_shared<const Frame>(std::move(frame));
-  TrackedFrame next{.frame = shared, .tracked = {}};
+  const WearableStep& step = wearable_->Step(std::move(frame));
+  TrackedFrame next{.frame = step.frame, .tracked = {}};
   TrackedEvent& tracked = next.tracked;
-  tracked.snapshot = tracker_->Track(*shared);
-  tracked.camera = shared->camera;
+  tracked.camera = step.frame->camera;
   tracked.stages.captured_ns =
-      clock_.ToMonotonic(shared->capture_time_ns, shared->received_time_ns);
-  tracked.stages.received_ns = shared->received_time_ns;
-  ring_.Push({shared, tracked.snapshot});
+      clock_.ToMonotonic(step.frame->capture_time_ns, step.frame->received_time_ns);
+  tracked.stages.received_ns = step.frame->received_time_ns;
   last_ = std::move(next);
-  for (const AnchorMoved& moved : book_->OnSnapshot(last_->tracked.snapshot, *shared->camera)) {
+  for (const AnchorMoved& moved : step.moved) {
     Log(absl::StrFormat("anchor %s moved %.1f mm: %s", moved.id, 1e3 * moved.delta_in_world.norm(),
                         moved.cause));
   }
-  TellGaze(*shared);
+  if (gaze_) gaze_->OnView(wearable_->View(options_.crop ? MountAngles{} : step.frame->mount));
   const Timestamp end_ns = MonotonicNow();
   last_->tracked.stages.tracked_ns = end_ns;
   tracked_ns_ = end_ns;
@@ -188,16 +167,6 @@ void Engine::TellGap(const Frame& before, const Frame& frame) {
       "source %s: frame %d is stamped %.6g s after frame %d (stamps count "
       "nanoseconds; was the clock set?): tracking starts anew",
       facts_.source, frame.id, Seconds(frame.capture_time_ns - before.capture_time_ns), before.id));
-}
-
-void Engine::TellGaze(const Frame& frame) {
-  if (!gaze_) return;
-  GazeView view{.map = last_->tracked.snapshot,
-                .annotations = book_->Latest(),
-                .angles = options_.crop ? MountAngles{} : frame.mount,
-                .down_in_world = std::nullopt};
-  if (upright_ && view.map->metric) view.down_in_world = Eigen::Vector3d::UnitY();
-  gaze_->OnView(std::move(view));
 }
 
 std::shared_ptr<const GazeSnapshot> Engine::gaze() const {
@@ -217,52 +186,21 @@ absl::Status Engine::SubmitGaze(GazeCommand command) {
       "server with --mount)");
 }
 
-// Without a new frame: commands may have changed annotations, the store may have answered.
+// Without a new frame: commands may have changed annotations or map, the store may have answered.
 void Engine::Settle() {
-  book_->Settle();  // also without a frame: stored annotations can be edited before the first
+  wearable_->Settle();
   if (!last_) return;
-  book_->OnSnapshot(last_->tracked.snapshot, *last_->tracked.camera);
-  const bool same = last_->tracked.annotations == book_->Latest() &&
-                    last_->tracked.snapshot == published_snapshot_;
+  const bool same = last_->tracked.annotations == wearable_->annotations() &&
+                    wearable_->newest()->snapshot == published_snapshot_;
   if (!same) Publish(/*new_frame=*/false);
 }
 
 void Engine::Publish(bool new_frame) {
-  last_->tracked.annotations = book_->Latest();
-  published_snapshot_ = last_->tracked.snapshot;
+  published_snapshot_ = wearable_->newest()->snapshot;
+  last_->tracked.snapshot = published_snapshot_;
+  last_->tracked.annotations = wearable_->annotations();
   sink_.OnTracked(last_->tracked);
   for (const auto& view : views_) new_frame ? view->Post(*last_) : view->Redraw(*last_);
-}
-
-void Engine::Execute(Command command) {
-  std::visit(
-      [this](auto& one) {
-        using T = std::decay_t<decltype(one)>;
-        if constexpr (std::is_same_v<T, CreateAnnotation>) {
-          book_->Create(one.draft, one.owner, one.done);
-        } else if constexpr (std::is_same_v<T, UpdateAnnotation>) {
-          book_->Update(one.patch, one.owner, one.done);
-        } else if constexpr (std::is_same_v<T, DeleteAnnotation>) {
-          book_->Delete(one.id, one.owner, [done = one.done](const absl::StatusOr<Annotation>& a) {
-            done(a.status());
-          });
-        } else if constexpr (std::is_same_v<T, UndoChange>) {
-          one.redo ? book_->Redo(one.owner, one.done) : book_->Undo(one.owner, one.done);
-        } else if constexpr (std::is_same_v<T, ForgetSession>) {
-          book_->ForgetSession(one.owner);
-          one.done(absl::OkStatus());
-        } else {
-          ResetTracker(one);
-        }
-      },
-      command);
-}
-
-void Engine::ResetTracker(const ResetMap& command) {
-  tracker_->Reset();
-  // What readers see changes with the next frame; after the end of the source there is none.
-  if (last_) last_->tracked.snapshot = tracker_->Track(*last_->frame);
-  command.done(last_ ? last_->tracked.snapshot->map_generation : 0);
 }
 
 void Engine::RunClock(std::stop_token stop) {
@@ -285,8 +223,7 @@ void Engine::RunClock(std::stop_token stop) {
 absl::Status Engine::Submit(Command command) { return inbox_.Submit(std::move(command)); }
 
 std::shared_ptr<const AnnotationList> Engine::annotations() const {
-  const std::lock_guard lock(book_gone_mutex_);
-  return book_ ? book_->Latest() : std::make_shared<const AnnotationList>();
+  return wearable_->annotations();
 }
 
 void Engine::SetPresence(std::shared_ptr<const ParticipantSet> present) {
@@ -302,9 +239,10 @@ void Engine::RequestKeyFrame(VideoView view) {
 }
 
 void Engine::GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) {
-  absl::StatusOr<PastFrame> past = frame_id ? ring_.Find(*frame_id) : ring_.Newest();
+  absl::StatusOr<PastFrame> past =
+      frame_id ? wearable_->ring().Find(*frame_id) : wearable_->ring().Newest();
   if (!past.ok()) return done(past.status());
-  ring_.Hold(*past);
+  wearable_->ring().Hold(*past);
   const absl::Status queued = stills_.Post({*std::move(past), view, done});
   if (!queued.ok()) done(queued);
 }
@@ -313,7 +251,7 @@ void Engine::MakeStill(StillRequest request) {
   TrackedFrame frame{.frame = request.past.frame, .tracked = {}};
   frame.tracked.snapshot = request.past.snapshot;
   frame.tracked.camera = request.past.frame->camera;
-  frame.tracked.annotations = book_->Latest();
+  frame.tracked.annotations = wearable_->annotations();
   frame.tracked.stages.captured_ns = request.past.frame->received_time_ns;
   std::vector<uchar> png;
   try {

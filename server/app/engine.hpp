@@ -6,13 +6,10 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 
-#include "server/anchors/frame_ring.hpp"
 #include "server/app/frame_clock.hpp"
-#include "server/app/frame_tracker.hpp"
 #include "server/app/gaze_runner.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/capture/frame_source.hpp"
@@ -20,7 +17,7 @@
 #include "server/pipeline/inbox.hpp"
 #include "server/pipeline/rolling_statistics.hpp"
 #include "server/rpc/backend.hpp"
-#include "server/store/annotation_book.hpp"
+#include "server/wearable/wearable.hpp"
 
 namespace saccade {
 
@@ -41,18 +38,18 @@ struct EngineOptions {
 /// Capture to packets: owns the threads and what they share.
 ///
 ///   source thread   FrameSource::Next
-///   tracker thread  commands, tracker, anchors; publishes to the sink
+///   tracker thread  the wearable: commands, frames; publishes to the sink
 ///   gaze thread     where there is a mount: steers it
 ///   view threads    one per view: draw, code
 ///   still thread    PNG for GetFrame
 ///   clock thread    statistics once a second
 class Engine : public Backend {
  public:
-  /// `store` may be null: annotations are kept in memory alone. `sink` outlives the engine.
+  /// `journal` may be null: annotations are kept in memory alone. `sink` outlives the engine.
   static absl::StatusOr<std::unique_ptr<Engine>> Create(EngineOptions options,
                                                         std::unique_ptr<FrameSource> source,
                                                         std::unique_ptr<FrameTracker> tracker,
-                                                        std::unique_ptr<AnnotationStore> store,
+                                                        std::unique_ptr<AnnotationJournal> journal,
                                                         EventSink& sink);
   ~Engine() override;
 
@@ -86,8 +83,7 @@ class Engine : public Backend {
     Done<Still> done;
   };
 
-  Engine(EngineOptions options, std::unique_ptr<FrameSource> source,
-         std::unique_ptr<FrameTracker> tracker, EventSink& sink);
+  Engine(EngineOptions options, std::unique_ptr<FrameSource> source, EventSink& sink);
 
   void RunSource(std::stop_token stop);
   void RunTracker(std::stop_token stop);
@@ -96,11 +92,8 @@ class Engine : public Backend {
   /// Says on stderr, at most every five seconds, that two frames in a row are too far apart in
   /// time.
   void TellGap(const Frame& before, const Frame& frame);
-  void TellGaze(const Frame& frame);
   void Settle();
   void Publish(bool new_frame);
-  void Execute(Command command);
-  void ResetTracker(const ResetMap& command);
   void MakeStill(StillRequest request);
   EngineStatistics Statistics() const;
   cv::Mat DrawAugmented(const TrackedFrame& frame) const;
@@ -108,11 +101,8 @@ class Engine : public Backend {
   const EngineOptions options_;
   ServerFacts facts_;
   EventSink& sink_;
-  std::unique_ptr<FrameSource> source_;       // source thread
-  std::unique_ptr<FrameTracker> tracker_;     // tracker thread
-  std::unique_ptr<AnnotationBook> book_;      // tracker thread, but for Latest()
-  mutable std::timed_mutex book_gone_mutex_;  // held to throw book_ away, and to read it elsewhere
-  FrameRing ring_;
+  std::unique_ptr<FrameSource> source_;  // source thread
+  std::unique_ptr<Wearable> wearable_;   // tracker thread, but for what says otherwise
   Inbox<Input, Command> inbox_;
   std::array<std::unique_ptr<ViewEncoder>, kVideoViews> views_;
 
@@ -126,7 +116,6 @@ class Engine : public Backend {
   std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, bad_frames_ = 0;
   std::atomic<Timestamp> tracked_ns_ = 0;  // when a frame last came
 
-  const bool upright_;                // the target's frame is the world's, and knows where down is
   std::unique_ptr<GazeRunner> gaze_;  // null: no mount
 
   Runner<StillRequest> stills_;

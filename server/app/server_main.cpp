@@ -14,13 +14,13 @@
 #include "server/app/open_source.hpp"
 #include "server/app/server_config.hpp"
 #include "server/app/shutdown.hpp"
-#include "server/app/slam_tracker.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
 #include "server/store/annotation_store.hpp"
+#include "server/tracker/tracker.hpp"
 #include "shared/io/log.hpp"
 
 namespace saccade {
@@ -73,7 +73,7 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
     if (!loaded.ok()) return loaded;
     if (absl::Status gaze = options.gaze.LoadToml(config.config_file); !gaze.ok()) return gaze;
   }
-  absl::StatusOr<std::unique_ptr<FrameTracker>> tracker = MakeSlamTracker(info, tracker_options);
+  absl::StatusOr<std::unique_ptr<Tracker>> tracker = Tracker::Create(info, tracker_options);
   if (!tracker.ok()) return tracker.status();
   shutdown.SetPhase("opening the data base");
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);

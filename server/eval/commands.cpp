@@ -6,11 +6,11 @@
 
 #include "server/capture/dataset.hpp"
 #include "server/eval/altered_source.hpp"
+#include "server/eval/eval_wearable.hpp"
 #include "server/eval/frame_range.hpp"
 #include "server/eval/run.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/score.hpp"
-#include "server/eval/tracker_session.hpp"
 #include "shared/io/regular_file.hpp"
 
 namespace saccade {
@@ -52,9 +52,10 @@ absl::Status RunCommand(const RunArguments& arguments) {
     if (!loaded.ok()) return loaded.status();
     truth = *std::move(loaded);
   }
-  const auto session = MakeTrackerSession(source->info(), arguments.tracker);
-  if (!session.ok()) return session.status();
-  const auto report = RunTracker(*source, session->track, truth, arguments.out);
+  const auto tracker = MakeTracker(source->info(), arguments.tracker);
+  if (!tracker.ok()) return tracker.status();
+  const auto report = RunTracker(
+      *source, [&](const Frame& frame) { return (*tracker)->Track(frame); }, truth, arguments.out);
   if (!report.ok()) return report.status();
   std::cout << (arguments.json ? report->dump(2) + "\n" : SummaryTable(*report));
   return absl::OkStatus();

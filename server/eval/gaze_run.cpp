@@ -28,8 +28,8 @@ absl::StatusOr<std::unique_ptr<GazeRun>> GazeRun::Create(const GazeRunOptions& o
   (*source)->DriveHead(mount);
   SourceInfo info = (*source)->info();
   if (!options.encoders) info.mount = nullptr;
-  absl::StatusOr<TrackerSession> session = MakeTrackerSession(info, options.tracker);
-  if (!session.ok()) return session.status();
+  absl::StatusOr<std::unique_ptr<Wearable>> wearable = MakeWearable(info, options.tracker);
+  if (!wearable.ok()) return wearable.status();
   absl::StatusOr<RunRecorder> recorder = RunRecorder::Create(options.folder);
   if (!recorder.ok()) return recorder.status();
   absl::StatusOr<OutputFile> truth = OutputFile::Create(options.folder / "groundtruth.txt");
@@ -39,29 +39,23 @@ absl::StatusOr<std::unique_ptr<GazeRun>> GazeRun::Create(const GazeRunOptions& o
   absl::StatusOr<OutputFile> looks = OutputFile::Create(options.folder / "looks.csv");
   if (!looks.ok()) return looks.status();
   return std::unique_ptr<GazeRun>(
-      new GazeRun(options, *std::move(source), std::move(mount), *std::move(session),
+      new GazeRun(options, *std::move(source), std::move(mount), *std::move(wearable),
                   *std::move(recorder), *std::move(truth), *std::move(gaze), *std::move(looks)));
 }
 
 GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> source,
-                 std::shared_ptr<SimMount> mount, TrackerSession session, RunRecorder recorder,
-                 OutputFile truth_file, OutputFile gaze_file, OutputFile looks_file)
+                 std::shared_ptr<SimMount> mount, std::unique_ptr<Wearable> wearable,
+                 RunRecorder recorder, OutputFile truth_file, OutputFile gaze_file,
+                 OutputFile looks_file)
     : options_(options),
       mount_(std::move(mount)),
       source_(std::move(source)),
-      session_(std::move(session)),
+      wearable_(std::move(wearable)),
       recorder_(std::move(recorder)),
       truth_file_(std::move(truth_file)),
       gaze_file_(std::move(gaze_file)),
       looks_file_(std::move(looks_file)),
-      loop_(std::make_unique<GazeLoop>(*mount_, options.gaze, [] { return "evaluation"; })),
-      ring_(std::make_unique<FrameRing>()) {
-  AnchorOptions anchor_options;
-  if (source_->info().target) anchor_options.world_key = WorldKey(*source_->info().target);
-  anchors_ = std::make_unique<AnchorManager>(
-      anchor_options,
-      [ring = ring_.get()](FrameId id) { return ring->Find(id, FrameRing::Want::kGrey); },
-      session_.seed);
+      loop_(std::make_unique<GazeLoop>(*mount_, options.gaze, [] { return "evaluation"; })) {
   mount_->AdvanceTo(0);
   looks_file_.Write(
       "time_s,annotation,arrived_after_s,true_error_deg,believed_error_deg,anchor_off_across_cm,"
@@ -72,7 +66,7 @@ GazeRun::GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> sourc
 }
 
 std::optional<Annotation> GazeRun::Find(const std::string& id) const {
-  const auto annotations = anchors_->Latest();  // held: the next frame replaces the list
+  const auto annotations = wearable_->annotations();  // held: the next frame replaces the list
   for (const Annotation& each : *annotations) {
     if (each.id == id) return each;
   }
@@ -179,21 +173,11 @@ absl::Status GazeRun::TakeFrame() {
   next_frame_ = frame.id + 1;
   const std::optional<MountAngles> read = frame.mount;
   if (!options_.encoders) frame.mount.reset();
-  const Timestamp begin = MonotonicNow();
-  const double cpu_begin_ms = ThreadCpuMs();
-  newest_ = session_.track(frame);
-  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin) - newest_->stage_ms.waited_ms,
-                          ThreadCpuMs() - cpu_begin_ms};
-  ring_->Push({std::make_shared<const Frame>(frame), newest_});
-  anchors_->Resolve(newest_, *frame.camera);
-  Due due{.publish_ns = frame.capture_time_ns + Ns(options_.delay_s), .view = {}};
-  due.view.map = newest_;
-  due.view.annotations = anchors_->Latest();
-  due.view.angles = read;
-  // The chessboard hangs upright on the wall: its frame knows where down is.
-  if (newest_->metric) due.view.down_in_world = Eigen::Vector3d::UnitY();
-  due_.push_back(std::move(due));
-  return Record(frame, cost);
+  const WearableStep& step = wearable_->Step(std::move(frame));
+  newest_ = step.snapshot;
+  due_.push_back({.publish_ns = step.frame->capture_time_ns + Ns(options_.delay_s),
+                  .view = wearable_->View(read)});
+  return Record(*step.frame, step.cost);
 }
 
 absl::Status GazeRun::Record(const Frame& frame, const FrameCost& cost) {
@@ -204,7 +188,7 @@ absl::Status GazeRun::Record(const Frame& frame, const FrameCost& cost) {
   const bool posed = verdict == FrameVerdict::kTracked || verdict == FrameVerdict::kCoasting;
   claims_.Observe({Seconds(frame.capture_time_ns), posed, newest_->metric, frame.camera.get(),
                    newest_->world_from_camera, truth},
-                  *anchors_->Latest(),
+                  *wearable_->annotations(),
                   [&](const Eigen::Vector3d& point) { return source_->Visible(frame.id, point); });
   if (posed && IsLost(newest_->world_from_camera, truth)) verdict = FrameVerdict::kLost;
   if (verdict != FrameVerdict::kInitialising) {
@@ -233,23 +217,15 @@ absl::StatusOr<GazeRun::Clicked> GazeRun::Click(const std::optional<Eigen::Vecto
   }
   const std::optional<Eigen::Vector3d> point = object ? object : source_->PointAt(frame, pixel);
   if (!point) return absl::NotFoundError("there is no surface");
-  AnnotationDraft draft;
-  draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", ++requests_);
-  draft.author = "expert";
-  draft.target = PixelTarget{frame, pixel};
-  const absl::StatusOr<AnnotationEdit> edit = anchors_->Create(draft, "expert");
-  if (!edit.ok()) return edit.status();
-  anchors_->Committed(edit->change.sequence);
+  const absl::StatusOr<Annotation> placed =
+      PlaceAsExpert(*wearable_, PixelTarget{frame, pixel}, ++requests_);
+  if (!placed.ok()) return placed.status();
   // Gaze control learns of it at once, as it would from the server's mailbox.
-  for (Due& due : due_) due.view.annotations = anchors_->Latest();
-  GazeView view;
-  view.map = newest_;
-  view.annotations = anchors_->Latest();
-  view.down_in_world = Eigen::Vector3d::UnitY();
-  loop_->OnView(view);  // without angles: no pose before its time
-  const Clicked clicked{edit->annotation.id, *point};
+  for (Due& due : due_) due.view.annotations = wearable_->annotations();
+  loop_->OnView(wearable_->View(std::nullopt));  // without angles: no pose before its time
+  const Clicked clicked{placed->id, *point};
   const Rigid3 eye = source_->WorldFromCamera(frame);
-  clicks_.push_back({time_s(), clicked, edit->annotation, eye});
+  clicks_.push_back({time_s(), clicked, *placed, eye});
   claims_.Place({clicked.id, requests_, time_s(), pixel, (*point - eye.translation).norm(),
                  IsOnOutline(*source_, eye.translation, *point), *point});
   return clicked;

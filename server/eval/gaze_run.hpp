@@ -8,12 +8,11 @@
 #include <optional>
 #include <string>
 
-#include "server/anchors/anchor_manager.hpp"
 #include "server/eval/claims.hpp"
+#include "server/eval/eval_wearable.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/statistics.hpp"
-#include "server/eval/tracker_session.hpp"
 #include "server/gaze/gaze_loop.hpp"
 #include "server/mount/sim_mount.hpp"
 #include "server/sim/sim_source.hpp"
@@ -89,7 +88,7 @@ class GazeRun {
 
  private:
   GazeRun(const GazeRunOptions& options, std::unique_ptr<SimSource> source,
-          std::shared_ptr<SimMount> mount, TrackerSession session, RunRecorder recorder,
+          std::shared_ptr<SimMount> mount, std::unique_ptr<Wearable> wearable, RunRecorder recorder,
           OutputFile truth_file, OutputFile gaze_file, OutputFile looks_file);
   absl::Status TakeFrame();
   std::optional<Annotation> Find(const std::string& id) const;
@@ -100,12 +99,10 @@ class GazeRun {
   const GazeRunOptions options_;
   std::shared_ptr<SimMount> mount_;
   std::unique_ptr<SimSource> source_;
-  TrackerSession session_;
+  std::unique_ptr<Wearable> wearable_;
   RunRecorder recorder_;
   OutputFile truth_file_, gaze_file_, looks_file_;
   std::unique_ptr<GazeLoop> loop_;
-  std::unique_ptr<FrameRing> ring_;
-  std::unique_ptr<AnchorManager> anchors_;
   Timestamp now_ns_ = 0;
   FrameId next_frame_ = 0;
   std::shared_ptr<const MapSnapshot> newest_;

@@ -5,9 +5,9 @@
 
 #include <iostream>
 
+#include "server/eval/eval_wearable.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/eval/statistics.hpp"
-#include "server/eval/tracker_session.hpp"
 #include "server/sim/corridor_source.hpp"
 
 namespace saccade {
@@ -29,26 +29,23 @@ class Walker {
                                                         const SimArguments& arguments, bool loops) {
     TrackerArguments options = arguments.tracker;
     options.set.push_back(absl::StrCat("loops=", loops ? 1 : 0));
-    absl::StatusOr<TrackerSession> session = MakeTrackerSession(source.info(), options);
-    if (!session.ok()) return session.status();
+    absl::StatusOr<std::unique_ptr<Wearable>> wearable = MakeWearable(source.info(), options);
+    if (!wearable.ok()) return wearable.status();
     absl::StatusOr<OutputFile> file =
         OutputFile::Create(arguments.out / absl::StrFormat("seed-%d-%s.csv", arguments.seed,
                                                            loops ? "loops" : "none"));
     if (!file.ok()) return file.status();
     file->Write("frame,way_m,status,error_m,revision,features,frame_ms\n");
-    return std::make_unique<Walker>(source, *std::move(session), *std::move(file));
+    return std::make_unique<Walker>(source, *std::move(wearable), *std::move(file));
   }
 
-  Walker(const CorridorSource& source, TrackerSession session, OutputFile file)
-      : source_(source), session_(std::move(session)), file_(std::move(file)) {
-    AnchorOptions options;
-    options.world_key = WorldKey(*source.info().target);
-    anchors_ = std::make_unique<AnchorManager>(
-        options, [this](FrameId id) { return ring_.Find(id); }, session_.seed);
-  }
+  Walker(const CorridorSource& source, std::unique_ptr<Wearable> wearable, OutputFile file)
+      : source_(source), wearable_(std::move(wearable)), file_(std::move(file)) {}
 
   void Step(const Frame& frame) {
-    const std::shared_ptr<const MapSnapshot> snapshot = session_.track(frame);
+    const std::vector<double> marks_before = MarkErrors();
+    const WearableStep& step = wearable_->Step(frame);
+    const std::shared_ptr<const MapSnapshot>& snapshot = step.snapshot;
     const double error_m =
         (snapshot->world_from_camera.translation - source_.WorldFromCamera(frame.id).translation)
             .norm();
@@ -56,7 +53,6 @@ class Walker {
     const bool tracked = snapshot->status == TrackingStatus::kTracking;
     tracked_ += tracked ? 1 : 0;
     const bool jumped = revision_ && *revision_ != snapshot->map_revision;
-    const std::vector<double> marks_before = MarkErrors();
     revision_ = snapshot->map_revision;
     last_features_ = snapshot->features.size();
     frame_ms_.Add(snapshot->stage_ms.total_ms);
@@ -66,8 +62,7 @@ class Walker {
     file_.Write(absl::StrFormat("%d,%.3f,%d,%.4f,%d,%d,%.2f\n", frame.id, way_m,
                                 static_cast<int>(snapshot->status), error_m, snapshot->map_revision,
                                 snapshot->features.size(), snapshot->stage_ms.total_ms));
-    ring_.Push({std::make_shared<const Frame>(frame), snapshot});
-    for (const AnchorMoved& moved : anchors_->Resolve(snapshot, *frame.camera)) {
+    for (const AnchorMoved& moved : step.moved) {
       moved_ += moved.cause == kCorrected ? 1 : 0;
     }
     if (jumped) {
@@ -123,19 +118,15 @@ class Walker {
   /// Clicks what is in the picture's middle.
   void Mark(const Frame& frame) {
     const Eigen::Vector2d pixel(0.5 * frame.camera->width(), 0.5 * frame.camera->height());
-    AnnotationDraft draft;
-    draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", frame.id);
-    draft.author = "expert";
-    draft.target = PixelTarget{frame.id, pixel};
-    const absl::StatusOr<AnnotationEdit> edit = anchors_->Create(draft, "expert");
-    if (!edit.ok()) return;
-    anchors_->Committed(edit->change.sequence);
-    marks_.push_back({edit->annotation.id, source_.PointAt(frame.id, pixel)});
+    const absl::StatusOr<Annotation> placed =
+        PlaceAsExpert(*wearable_, PixelTarget{frame.id, pixel}, static_cast<int>(frame.id));
+    if (!placed.ok()) return;
+    marks_.push_back({placed->id, source_.PointAt(frame.id, pixel)});
   }
 
   std::vector<double> MarkErrors() const {
     std::vector<double> errors;
-    for (const Annotation& annotation : *anchors_->Latest()) {
+    for (const Annotation& annotation : *wearable_->annotations()) {
       for (const Marked& marked : marks_) {
         if (marked.id != annotation.id) continue;
         errors.push_back((annotation.anchor.point_in_world - marked.true_point).norm());
@@ -145,10 +136,8 @@ class Walker {
   }
 
   const CorridorSource& source_;
-  TrackerSession session_;
+  std::unique_ptr<Wearable> wearable_;
   OutputFile file_;
-  FrameRing ring_;
-  std::unique_ptr<AnchorManager> anchors_;
   std::vector<Marked> marks_;
   struct Walked {
     double way_m;

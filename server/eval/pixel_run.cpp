@@ -58,37 +58,31 @@ absl::StatusOr<PixelRun> PixelRun::Create(const SimOptions& options,
   if (!source.ok()) return source.status();
   SourceInfo info = (*source)->info();
   if (targetless) info.target.reset();
-  absl::StatusOr<TrackerSession> session = MakeTrackerSession(info, tracker);
-  if (!session.ok()) return session.status();
+  absl::StatusOr<std::unique_ptr<Wearable>> wearable = MakeWearable(info, tracker);
+  if (!wearable.ok()) return wearable.status();
   absl::StatusOr<RunRecorder> recorder = RunRecorder::Create(folder);
   if (!recorder.ok()) return recorder.status();
   absl::StatusOr<OutputFile> truth = OutputFile::Create(folder / "groundtruth.txt");
   if (!truth.ok()) return truth.status();
   absl::StatusOr<OutputFile> anchors = OutputFile::Create(folder / "anchors.csv");
   if (!anchors.ok()) return anchors.status();
-  return PixelRun(*std::move(source), *std::move(session), *std::move(recorder), *std::move(truth),
+  return PixelRun(*std::move(source), *std::move(wearable), *std::move(recorder), *std::move(truth),
                   *std::move(anchors), options, plan, folder);
 }
 
-PixelRun::PixelRun(std::unique_ptr<SimSource> source, TrackerSession session, RunRecorder recorder,
-                   OutputFile truth_file, OutputFile anchors_file, const SimOptions& options,
-                   const ClickPlan& plan, const std::filesystem::path& folder)
+PixelRun::PixelRun(std::unique_ptr<SimSource> source, std::unique_ptr<Wearable> wearable,
+                   RunRecorder recorder, OutputFile truth_file, OutputFile anchors_file,
+                   const SimOptions& options, const ClickPlan& plan,
+                   const std::filesystem::path& folder)
     : source_(std::move(source)),
-      session_(std::move(session)),
+      wearable_(std::move(wearable)),
       recorder_(std::move(recorder)),
       truth_file_(std::move(truth_file)),
       anchors_file_(std::move(anchors_file)),
       plan_(plan),
       fps_(options.fps),
       rng_(options.seed),
-      ring_(std::make_unique<FrameRing>()),
       folder_(folder) {
-  AnchorOptions anchor_options;
-  if (source_->info().target) anchor_options.world_key = WorldKey(*source_->info().target);
-  anchors_ = std::make_unique<AnchorManager>(
-      anchor_options,
-      [ring = ring_.get()](FrameId id) { return ring->Find(id, FrameRing::Want::kGrey); },
-      session_.seed);
   truth_file_.Write("# timestamp tx ty tz qx qy qz qw   (camera in world, metres)\n");
   anchors_file_.Write(
       "frame,anchor,state,drawn,true_u_px,true_v_px,error_px,error_mm_per_m,error_m,reported_error_"
@@ -126,12 +120,9 @@ absl::StatusOr<std::optional<double>> PixelRun::Run(PixelRunTotals& totals) {
 }
 
 absl::Status PixelRun::Step(const Frame& frame, PixelRunTotals& totals) {
-  const Timestamp begin = MonotonicNow();
-  const double cpu_begin_ms = ThreadCpuMs();
-  const std::shared_ptr<const MapSnapshot> snapshot = session_.track(frame);
-  const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin) - snapshot->stage_ms.waited_ms,
-                          ThreadCpuMs() - cpu_begin_ms};
-  totals.frame_ms.Add(cost.wall_ms);
+  const WearableStep& step = wearable_->Step(frame);
+  const std::shared_ptr<const MapSnapshot>& snapshot = step.snapshot;
+  totals.frame_ms.Add(step.cost.wall_ms);
 
   const Rigid3 truth = source_->WorldFromCamera(frame.id);
   truth_.push_back({frame.capture_time_ns, truth});
@@ -150,11 +141,10 @@ absl::Status PixelRun::Step(const Frame& frame, PixelRunTotals& totals) {
   if (pose_published && metric_ && IsLost(snapshot->world_from_camera, truth)) {
     verdict = FrameVerdict::kLost;
   }
-  if (const absl::Status status = recorder_.Add(frame, *snapshot, cost, verdict); !status.ok()) {
+  if (const absl::Status status = recorder_.Add(frame, *snapshot, step.cost, verdict);
+      !status.ok()) {
     return status;
   }
-  ring_->Push({std::make_shared<const Frame>(frame), snapshot});
-  anchors_->Resolve(snapshot, *frame.camera);
   ClickIfDue(frame.id, totals);
   WatchClaims(frame, *snapshot, pose_published);
   CompareAnchors(frame, *snapshot, pose_published, totals);
@@ -173,21 +163,17 @@ void PixelRun::ClickIfDue(FrameId now, PixelRunTotals& totals) {
     ++totals.refused_clicks;
     return;
   }
-  AnnotationDraft draft;
-  draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", clicks_);
-  draft.author = "expert";
-  draft.target = PixelTarget{seen, surface->pixel};
-  const absl::StatusOr<AnnotationEdit> edit = anchors_->Create(draft, "expert");
-  if (!edit.ok()) {
+  const absl::StatusOr<Annotation> placed =
+      PlaceAsExpert(*wearable_, PixelTarget{seen, surface->pixel}, clicks_);
+  if (!placed.ok()) {
     anchors_file_.Write(absl::StrCat("# click ", clicks_, " in frame ", seen,
-                                     " refused: ", edit.status().message(), "\n"));
+                                     " refused: ", placed.status().message(), "\n"));
     ++totals.refused_clicks;
     return;
   }
-  anchors_->Committed(edit->change.sequence);
-  clicked_.push_back({edit->annotation.id, clicks_, surface->point_in_world});
+  clicked_.push_back({placed->id, clicks_, surface->point_in_world});
   const Rigid3 eye = source_->WorldFromCamera(seen);
-  claims_.Place({edit->annotation.id, clicks_, time_s, surface->pixel,
+  claims_.Place({placed->id, clicks_, time_s, surface->pixel,
                  (surface->point_in_world - eye.translation).norm(),
                  IsOnOutline(*source_, eye.translation, surface->point_in_world),
                  surface->point_in_world});
@@ -228,13 +214,13 @@ void PixelRun::WatchClaims(const Frame& frame, const MapSnapshot& snapshot, bool
                         frame.camera.get(),
                         snapshot.world_from_camera,
                         source_->WorldFromCamera(frame.id)};
-  claims_.Observe(seen, *anchors_->Latest(),
+  claims_.Observe(seen, *wearable_->annotations(),
                   [&](const Eigen::Vector3d& point) { return source_->Visible(frame.id, point); });
 }
 
 void PixelRun::CompareAnchors(const Frame& frame, const MapSnapshot& snapshot, bool pose_published,
                               PixelRunTotals& totals) {
-  const auto latest = anchors_->Latest();
+  const auto latest = wearable_->annotations();
   for (const Clicked& clicked : clicked_) {
     const auto true_pixel = source_->PixelOf(frame.id, clicked.true_point);
     if (!true_pixel || !frame.camera->InImage(*true_pixel)) continue;

@@ -7,13 +7,12 @@
 #include <random>
 #include <vector>
 
-#include "server/anchors/anchor_manager.hpp"
 #include "server/eval/claims.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/scale_windows.hpp"
 #include "server/eval/statistics.hpp"
-#include "server/eval/tracker_session.hpp"
+#include "server/eval/eval_wearable.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {
@@ -66,9 +65,9 @@ class PixelRun {
     Eigen::Vector3d true_point = Eigen::Vector3d::Zero();
   };
 
-  PixelRun(std::unique_ptr<SimSource> source, TrackerSession session, RunRecorder recorder,
-           OutputFile truth_file, OutputFile anchors_file, const SimOptions& options,
-           const ClickPlan& plan, const std::filesystem::path& folder);
+  PixelRun(std::unique_ptr<SimSource> source, std::unique_ptr<Wearable> wearable,
+           RunRecorder recorder, OutputFile truth_file, OutputFile anchors_file,
+           const SimOptions& options, const ClickPlan& plan, const std::filesystem::path& folder);
   absl::Status Step(const Frame& frame, PixelRunTotals& totals);
   void ClickIfDue(FrameId now, PixelRunTotals& totals);
   /// A pixel of `frame` that shows a surface, and the point it shows.
@@ -82,14 +81,12 @@ class PixelRun {
                       PixelRunTotals& totals);
 
   std::unique_ptr<SimSource> source_;
-  TrackerSession session_;
+  std::unique_ptr<Wearable> wearable_;
   RunRecorder recorder_;
   OutputFile truth_file_, anchors_file_;
   ClickPlan plan_;
   double fps_;
   std::mt19937_64 rng_;
-  std::unique_ptr<FrameRing> ring_;
-  std::unique_ptr<AnchorManager> anchors_;
   std::vector<Clicked> clicked_;
   ClaimLog claims_;
   std::filesystem::path folder_;

@@ -74,10 +74,9 @@ absl::Status RunVariant(const PointsWorld& world, const PointsOptions& options,
   }
   std::vector<PosePair> pairs;
   for (std::size_t i = 0; i < world.frames.size(); ++i) {
-    const Timestamp begin = MonotonicNow();
-    const double cpu_begin_ms = ThreadCpuMs();
+    CostMeter meter;
     const absl::StatusOr<PointsStep> step = filter.Step(i);
-    const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin), ThreadCpuMs() - cpu_begin_ms};
+    const FrameCost cost = meter.Read();
     ++variant.frames;
     if (!step.ok()) {
       std::cerr << absl::StrCat(folder.string(), ", ", variant.name, ", frame ", i, ": ",

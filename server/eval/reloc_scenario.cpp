@@ -12,10 +12,11 @@
 #include <random>
 
 #include "server/capture/dataset.hpp"
+#include "server/eval/eval_wearable.hpp"
 #include "server/eval/output_file.hpp"
+#include "server/eval/run.hpp"
 #include "server/eval/statistics.hpp"
 #include "server/eval/still_camera.hpp"
-#include "server/eval/tracker_session.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {
@@ -97,7 +98,10 @@ absl::StatusOr<Trial> InCopy(const std::function<Trial()>& work) {
 
 /// The map that everything starts from, and the way it was made.
 struct Mapped {
-  TrackerSession session;
+  std::unique_ptr<Tracker> tracker;
+  TrackFunction Track() const {
+    return [tracker = tracker.get()](const Frame& frame) { return tracker->Track(frame); };
+  }
   Frame last;
   std::vector<Rigid3> path;             // true poses from kStart_s on
   std::vector<Eigen::Vector3d> points;  // of features whose depth is known, at the end
@@ -110,15 +114,16 @@ absl::StatusOr<Mapped> MakeMap(const SimArguments& arguments) {
   options.duration_s = arguments.duration_s;
   const absl::StatusOr<std::unique_ptr<SimSource>> source = SimSource::Open(options);
   if (!source.ok()) return source.status();
-  absl::StatusOr<TrackerSession> session = MakeTrackerSession((*source)->info(), arguments.tracker);
-  if (!session.ok()) return session.status();
+  absl::StatusOr<std::unique_ptr<Tracker>> tracker =
+      MakeTracker((*source)->info(), arguments.tracker);
+  if (!tracker.ok()) return tracker.status();
   Mapped mapped;
-  mapped.session = *std::move(session);
+  mapped.tracker = *std::move(tracker);
   while (true) {
     absl::StatusOr<std::optional<Frame>> frame = (*source)->Next();
     if (!frame.ok()) return frame.status();
     if (!*frame) break;
-    const auto snapshot = mapped.session.track(**frame);
+    const auto snapshot = mapped.tracker->Track(**frame);
     ++mapped.frames;
     mapped.tracked += snapshot->status == TrackingStatus::kTracking ? 1 : 0;
     mapped.features = snapshot->features.size();
@@ -131,7 +136,7 @@ absl::StatusOr<Mapped> MakeMap(const SimArguments& arguments) {
     }
     mapped.last = **std::move(frame);
   }
-  mapped.session.wait();
+  mapped.tracker->WaitForBackground();
   if (mapped.path.empty()) {
     return absl::InvalidArgumentError(
         absl::StrCat("reloc: --duration must be above ", kStart_s, " s"));
@@ -178,7 +183,7 @@ absl::StatusOr<std::vector<Trial>> RunTrials(const SimArguments& arguments, cons
       pictures.push_back(*std::move(picture));
     }
     absl::StatusOr<Trial> trial = InCopy([&, &truth = truth]() -> Trial {
-      Feeder feeder(mapped.session.track, mapped.last);
+      Feeder feeder(mapped.Track(), mapped.last);
       Trial result;
       if (!feeder.Lose().ok()) return result;
       TrackingStatus before = TrackingStatus::kLost;
@@ -214,7 +219,7 @@ absl::StatusOr<std::vector<Trial>> RunTrials(const SimArguments& arguments, cons
 /// Pictures of other places, one after the other, to a tracker that is lost.
 class ForeignLooks {
  public:
-  explicit ForeignLooks(const Mapped& mapped) : feeder_(mapped.session.track, mapped.last) {}
+  explicit ForeignLooks(const Mapped& mapped) : feeder_(mapped.Track(), mapped.last) {}
 
   absl::Status Begin() { return feeder_.Lose(); }
   /// Each picture is looked at twice: a lost tracker asks at every second frame.

@@ -1,7 +1,6 @@
 #include "server/eval/run.hpp"
 
 #include <absl/strings/str_format.h>
-#include <time.h>
 
 #include <iostream>
 
@@ -14,12 +13,6 @@ constexpr Timestamp kProgressEvery_ns = 10'000'000'000;
 
 }  // namespace
 
-double ThreadCpuMs() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
 absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const TrackFunction& track,
                                                   const Trajectory& truth,
                                                   const std::filesystem::path& folder) {
@@ -31,11 +24,9 @@ absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const Tra
     absl::StatusOr<std::optional<Frame>> frame = source.Next();
     if (!frame.ok()) return frame.status();
     if (!*frame) break;
-    const Timestamp begin = MonotonicNow();
-    const double cpu_begin_ms = ThreadCpuMs();
+    CostMeter meter;
     const std::shared_ptr<const MapSnapshot> snapshot = track(**frame);
-    const FrameCost cost = {1e3 * Seconds(MonotonicNow() - begin) - snapshot->stage_ms.waited_ms,
-                            ThreadCpuMs() - cpu_begin_ms};
+    const FrameCost cost = meter.Read(snapshot->stage_ms.waited_ms);
     if (const absl::Status status = recorder->Add(**frame, *snapshot, cost); !status.ok()) {
       return status;
     }

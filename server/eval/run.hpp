@@ -23,7 +23,4 @@ absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const Tra
                                                   const Trajectory& truth,
                                                   const std::filesystem::path& folder);
 
-/// CPU time of the calling thread [ms].
-double ThreadCpuMs();
-
 }  // namespace saccade

@@ -12,6 +12,7 @@
 #include "server/eval/score.hpp"
 #include "server/eval/statistics.hpp"
 #include "server/eval/trajectory.hpp"
+#include "server/pipeline/frame_cost.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -24,12 +25,6 @@ inline constexpr int kMinTrackedMatches = 5;
 
 FrameVerdict VerdictOf(const MapSnapshot& snapshot);
 const char* ToString(FrameVerdict verdict);
-
-/// Time that one frame took, from the decoded image to the published pose.
-struct FrameCost {
-  double wall_ms = 0;
-  double cpu_ms = 0;  // of the tracker's thread
-};
 
 /// Writes trajectory.tum and frames.csv while a run goes on, and report.json at its end
 /// (architecture section 4). Poses are written as published and never revised. One thread.

@@ -5,8 +5,8 @@
 #include <Eigen/Dense>
 #include <memory>
 
-#include "server/capture/frame.hpp"
 #include "server/capture/frame_source.hpp"
+#include "server/tracker/frame_tracker.hpp"
 #include "server/tracker/tracker_options.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
@@ -16,13 +16,13 @@ namespace saccade {
 ///
 /// Frame in, snapshot out; one thread at a time. Deterministic for one seed. Losing track is a
 /// state of the snapshot, never an error.
-class Tracker {
+class Tracker final : public FrameTracker {
  public:
   /// `source`: the camera (never null) and, if the place has one, its target and start pose.
   /// InvalidArgument: options out of range, no camera, a target that cannot be used.
   static absl::StatusOr<std::unique_ptr<Tracker>> Create(const SourceInfo& source,
                                                          const TrackerOptions& options);
-  ~Tracker();
+  ~Tracker() override;
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
 
@@ -30,13 +30,13 @@ class Tracker {
   /// last, or not of the camera's size, changes nothing but the snapshot's frame id. After a gap of
   /// more than a second, or where the clock was set back by more, tracking starts anew: in the map,
   /// if it recognises it. The cost of a frame does not depend on the gap.
-  std::shared_ptr<const MapSnapshot> Track(const Frame& frame);
+  std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override;
 
   /// Returns when nothing is being computed on other threads (for a process that forks).
   void WaitForBackground() const;
 
   /// Throws the map away; the next frame starts anew (with the target, where there is one in view).
-  void Reset();
+  void Reset() override;
 
   /// Starts a feature at something seen in an earlier frame, typically clicked by an expert.
   ///
@@ -48,7 +48,7 @@ class Tracker {
   ///   NotFound            the patch is not seen in the newest frame, or has no texture
   absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame, const Rigid3& world_from_camera,
                                         const Eigen::Vector2d& pixel, double depth_prior_m,
-                                        double depth_sigma_m);
+                                        double depth_sigma_m) override;
 
   const TrackerOptions& options() const;
 

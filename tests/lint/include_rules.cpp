@@ -16,7 +16,7 @@ using std::string_view;
 // Listed along the data flow: a folder includes only itself and those before it.
 constexpr auto kServerOrder = std::to_array<string_view>(
     {"pipeline", "mount", "gl", "capture", "sim", "scene", "features", "filter", "map", "tracker",
-     "anchors", "gaze", "overlay", "encode", "store", "rpc", "gateway", "eval", "app"});
+     "anchors", "gaze", "wearable", "overlay", "encode", "store", "rpc", "gateway", "eval", "app"});
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder =

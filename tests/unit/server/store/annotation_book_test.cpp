@@ -1,4 +1,4 @@
-#include "server/store/annotation_book.hpp"
+#include "server/anchors/annotation_book.hpp"
 
 #include <sys/mount.h>
 

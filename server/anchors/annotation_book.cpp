@@ -1,4 +1,4 @@
-#include "server/store/annotation_book.hpp"
+#include "server/anchors/annotation_book.hpp"
 
 #include <absl/strings/str_cat.h>
 
@@ -35,7 +35,7 @@ class AnnotationBook::Owed {
 
 absl::StatusOr<std::unique_ptr<AnnotationBook>> AnnotationBook::Open(
     AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-    std::unique_ptr<AnnotationStore> store, std::function<void()> wake) {
+    std::unique_ptr<AnnotationJournal> store, std::function<void()> wake) {
   if (absl::Status status = options.Validate(); !status.ok()) return status;
   std::unique_ptr<AnnotationBook> book(new AnnotationBook(
       std::move(options), std::move(frames), std::move(seed), std::move(store), std::move(wake)));
@@ -50,7 +50,7 @@ absl::StatusOr<std::unique_ptr<AnnotationBook>> AnnotationBook::Open(
 }
 
 AnnotationBook::AnnotationBook(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-                               std::unique_ptr<AnnotationStore> store, std::function<void()> wake)
+                               std::unique_ptr<AnnotationJournal> store, std::function<void()> wake)
     : anchors_(std::move(options), std::move(frames), std::move(seed)),
       owed_(std::make_shared<Owed>(std::move(wake))),
       store_(std::move(store)) {}

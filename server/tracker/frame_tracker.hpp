@@ -10,7 +10,8 @@
 
 namespace saccade {
 
-/// What the engine needs of a tracker; the tracker thread alone calls it. Tests put their own in.
+/// What a wearable needs of a tracker: a frame in, a snapshot out. One thread at a time. Tests put
+/// their own in.
 class FrameTracker {
  public:
   virtual ~FrameTracker() = default;

@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "server/anchors/anchor_manager.hpp"
-#include "server/store/annotation_store.hpp"
+#include "server/anchors/annotation_journal.hpp"
 
 namespace saccade {
 
-/// The annotations as RPCs see them: AnchorManager with AnnotationStore behind it. Every call but
-/// Latest() on the tracker thread. An answer is given after commit, once, on the store's thread (or
-/// at once on the caller's, for a refusal); it must not call back into the book. An edit that
+/// The annotations as RPCs see them: AnchorManager with a journal behind it. Every call but
+/// Latest() on the tracker thread. An answer is given after commit, once, on the journal's thread
+/// (or at once on the caller's, for a refusal); it must not call back into the book. An edit that
 /// cannot be saved is taken back before it is answered, so that whoever hears of it lists what is
 /// on disk.
 class AnnotationBook {
@@ -25,12 +25,12 @@ class AnnotationBook {
   using AnnotationDone = std::function<void(const absl::StatusOr<Annotation>&)>;
   using DescriptionDone = std::function<void(const absl::StatusOr<std::string>&)>;
 
-  /// Loads what is on disk. `store` may be null: nothing is kept (offline evaluation), answers come
-  /// at once. `wake` asks for a Settle() soon, on any thread; without it edits that could not be
-  /// saved are answered at the next call.
+  /// Loads what the journal keeps. `store` may be null: nothing is kept (offline evaluation),
+  /// answers come at once. `wake` asks for a Settle() soon, on any thread; without it edits that
+  /// could not be saved are answered at the next call.
   static absl::StatusOr<std::unique_ptr<AnnotationBook>> Open(
       AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-      std::unique_ptr<AnnotationStore> store, std::function<void()> wake = nullptr);
+      std::unique_ptr<AnnotationJournal> store, std::function<void()> wake = nullptr);
   /// Commits what is queued and gives every answer that is owed.
   ~AnnotationBook();
 
@@ -51,7 +51,7 @@ class AnnotationBook {
   /// answers those whose edits were lost. Every other call begins with it.
   void Settle();
 
-  /// As AnnotationStore::Flush. Any thread.
+  /// As AnnotationJournal::Flush. Any thread.
   absl::Status Flush(std::chrono::milliseconds limit) {
     return store_ ? store_->Flush(limit) : absl::OkStatus();
   }
@@ -64,7 +64,7 @@ class AnnotationBook {
 
  private:
   AnnotationBook(AnchorOptions options, FrameLookup frames, SeedFeatureFunction seed,
-                 std::unique_ptr<AnnotationStore> store, std::function<void()> wake);
+                 std::unique_ptr<AnnotationJournal> store, std::function<void()> wake);
   /// Answers to edits that could not be saved, until memory is taken back. Any thread.
   class Owed;
   struct AnsweredCreate {
@@ -80,7 +80,7 @@ class AnnotationBook {
 
   AnchorManager anchors_;
   std::shared_ptr<Owed> owed_;
-  std::unique_ptr<AnnotationStore> store_;
+  std::unique_ptr<AnnotationJournal> store_;
   absl::flat_hash_map<std::string, AnsweredCreate> requests_;  // by request id
   std::deque<std::string> request_order_;                      // oldest first
 };

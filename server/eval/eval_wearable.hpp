@@ -1,0 +1,25 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <memory>
+
+#include "server/eval/commands.hpp"
+#include "server/tracker/tracker.hpp"
+#include "server/wearable/wearable.hpp"
+
+namespace saccade {
+
+/// The product's tracker for one source, with `--config` and `--set`. Errors of options name the
+/// key and what it may be.
+absl::StatusOr<std::unique_ptr<Tracker>> MakeTracker(const SourceInfo& info,
+                                                     const TrackerArguments& arguments);
+
+/// A wearable with that tracker; annotations are kept in memory alone.
+absl::StatusOr<std::unique_ptr<Wearable>> MakeWearable(const SourceInfo& info,
+                                                       const TrackerArguments& arguments);
+
+/// What an expert does: a Create, answered at once. `number`: of the request, above 0.
+absl::StatusOr<Annotation> PlaceAsExpert(Wearable& wearable, AnnotationTarget target, int number);
+
+}  // namespace saccade
