@@ -25,7 +25,7 @@ struct DormantLandmark {
   /// Where the keyframe graph had it when it was last asked (Locate).
   struct Place {
     std::uint64_t version = 0;  // of its keyframe; 0: never asked
-    KeyframeGraph::Remembered known;
+    KeyframeGraph::Recalled known;
     bool somewhere = false;                          // adjustment may have put it behind infinity
     double range_m = 0.0;                            // from its keyframe, along `ray`
     Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();  // unit, in world
@@ -47,7 +47,7 @@ struct DormantOptions {
 /// tracker's thread owns it.
 class DormantLandmarks {
  public:
-  using Lookup = std::function<std::optional<KeyframeGraph::Remembered>(FeatureId)>;
+  using Lookup = std::function<std::optional<KeyframeGraph::Recalled>(FeatureId)>;
   using VersionOf = std::function<std::uint64_t(KeyframeId)>;
 
   explicit DormantLandmarks(const DormantOptions& options) : options_(options) {}

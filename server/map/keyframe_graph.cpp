@@ -111,12 +111,12 @@ std::uint64_t KeyframeGraph::Version(KeyframeId id) const {
   return at == keyframes_.end() ? 0 : at->second.version;
 }
 
-std::optional<KeyframeGraph::Remembered> KeyframeGraph::Remember(FeatureId id) const {
+std::optional<KeyframeGraph::Recalled> KeyframeGraph::Recall(FeatureId id) const {
   const auto at = points_.find(id);
   if (at == points_.end()) return std::nullopt;
   const Point& point = at->second;
-  return Remembered{point.anchor, keyframes_.at(point.anchor).world_from_camera, point.estimate,
-                    point.birth.sigma_rad};
+  return Recalled{point.anchor, keyframes_.at(point.anchor).world_from_camera, point.estimate,
+                  point.birth.sigma_rad};
 }
 
 void KeyframeGraph::SetEstimate(FeatureId id, const GraphEstimate& estimate) {

@@ -84,7 +84,7 @@ class KeyframeGraph {
   /// show parallax: a camera that only turns has nothing to adjust.
   std::optional<Job> MakeJob(const Lookup& estimate) const;
   /// A point as the graph has it, and the pose that it was first seen from.
-  struct Remembered {
+  struct Recalled {
     KeyframeId anchor = 0;
     Rigid3 world_from_anchor;
     GraphEstimate estimate;
@@ -94,7 +94,7 @@ class KeyframeGraph {
       return world_from_anchor * (estimate.bearing / estimate.inverse_range);
     }
   };
-  std::optional<Remembered> Remember(FeatureId id) const;
+  std::optional<Recalled> Recall(FeatureId id) const;
   /// Changes whenever the keyframe or a point that it saw first does; 0: there is no such keyframe.
   /// So who remembers a large map need not ask for all of it in every frame.
   std::uint64_t Version(KeyframeId id) const;

@@ -5,12 +5,11 @@ namespace saccade {
 namespace {
 
 // Well enough known to be found again.
-constexpr std::uint32_t kMature = 15;       // matches
-constexpr double kDepthKnown = 0.1;         // sigma / inverse range
-constexpr double kSeedDepthKnown = 0.02;    // the same of a seeded one: a mark waits for its depth
-constexpr double kMoved = 0.1;              // of the distance to what is in view
-constexpr double kLeastDepthSigma = 0.005;  // a woken one's; of its inverse range
-constexpr std::int64_t kPause = 150;        // frames that one rests which was woken in vain
+constexpr std::uint32_t kMature = 15;     // matches
+constexpr double kDepthKnown = 0.1;       // sigma / inverse range
+constexpr double kSeedDepthKnown = 0.02;  // the same of a seeded one: a mark waits for its depth
+constexpr double kMoved = 0.1;            // of the distance to what is in view
+constexpr std::int64_t kPause = 150;      // frames that one rests which was woken in vain
 constexpr int kMostFailures = 3;
 constexpr int kMostAtOnce = 30;
 
@@ -25,7 +24,7 @@ int Failures(const Landmark& landmark) {
 bool Tracker::Impl::MayRest(const Landmark& landmark) const {
   if (!options_.wake || landmark.known || landmark.matched < kMature ||
       Failures(landmark) >= kMostFailures || !filter_.Has(landmark.id) ||
-      !refiner_.Remember(landmark.id)) {
+      !map_.Recall(landmark.id)) {
     return false;
   }
   const FeatureMarginal marginal = filter_.Marginal(landmark.id);
@@ -34,7 +33,7 @@ bool Tracker::Impl::MayRest(const Landmark& landmark) const {
 }
 
 bool Tracker::Impl::HasMovedFrom(const Landmark& landmark) const {
-  const auto known = refiner_.Remember(landmark.id);
+  const auto known = map_.Recall(landmark.id);
   if (!known) return false;
   const Eigen::Vector3d way =
       filter_.camera().world_from_camera.translation - known->world_from_anchor.translation;
@@ -42,25 +41,17 @@ bool Tracker::Impl::HasMovedFrom(const Landmark& landmark) const {
 }
 
 void Tracker::Impl::Rest(std::span<const FeatureId> ids) {
-  for (const FeatureId id : ids) {
-    const Landmark* landmark = map_.Find(id);
-    if (landmark == nullptr || !MayRest(*landmark)) continue;
-    const FeatureMarginal marginal = filter_.Marginal(id);
-    const bool failed = MapKeeper::FailsProbation(*landmark);
-    DormantLandmark dormant;
-    dormant.landmark = *landmark;
-    dormant.failures = Failures(*landmark);
-    dormant.inverse_range_sigma = marginal.inverse_range_sigma;
-    dormant.covariance_in_world = marginal.covariance_in_world;
-    dormant.home = home_;
-    dormant.rests_until = failed ? frames_ + kPause : 0;
+  const auto judge = [this](const Landmark& landmark) -> std::optional<RestNote> {
+    if (!MayRest(landmark)) return std::nullopt;
     // What was woken in vain has taught the filter nothing.
-    if (!failed) refiner_.Rest(id, filter_);
-    dormant_.Put(std::move(dormant));
-  }
-  filter_.Remove(ids);
-  map_.Remove(ids);
-  LocateDormant();
+    const bool failed = MapKeeper::FailsProbation(landmark);
+    return RestNote{.home = home_,
+                    .rests_until = failed ? frames_ + kPause : 0,
+                    .failures = Failures(landmark),
+                    .learnt = !failed};
+  };
+  map_.Retire(ids, judge, filter_);
+  map_.LocateAtRest();
 }
 
 Matrix6d Tracker::Impl::WakeCovariance(double distance_m) const {
@@ -72,66 +63,41 @@ Matrix6d Tracker::Impl::WakeCovariance(double distance_m) const {
 
 void Tracker::Impl::Wake(const CameraModel& camera) {
   const int missing = std::min(kMostAtOnce, keeper_.Missing(matches_));
-  if (!options_.wake || missing <= 0 || dormant_.size() == 0) return;
-  LocateDormant();
+  if (!options_.wake || missing <= 0 || map_.at_rest().size() == 0) return;
+  map_.LocateAtRest();
   std::vector<Eigen::Vector2d> occupied;
   for (const LandmarkMatch& match : matches_.in_view) occupied.push_back(match.pixel);
   const auto groups =
-      dormant_.InView(camera, filter_.camera().world_from_camera, frames_, missing, occupied);
+      map_.at_rest().InView(camera, filter_.camera().world_from_camera, frames_, missing, occupied);
   const double distance_m = 1.0 / std::max(1e-6, depth_.inverse_range);
   for (const auto& [keyframe, ids] : groups) {
-    const AnchorPoseId clone = refiner_.CloneOf(keyframe, WakeCovariance(distance_m), filter_);
-    for (const FeatureId id : ids) WakeOne(id, clone, *refiner_.Remember(id));
+    map_.Wake(keyframe, ids, WakeCovariance(distance_m), frames_, filter_);
   }
-  filter_.Remove({});  // a clone that nothing was woken in goes again
 }
 
-void Tracker::Impl::WakeOne(FeatureId id, AnchorPoseId clone,
-                            const KeyframeGraph::Remembered& known) {
-  DormantLandmark dormant = dormant_.Take(id);
-  FeatureBirth birth;
-  birth.id = id;
-  birth.bearing = known.estimate.bearing;
-  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(birth.bearing);
-  birth.bearing_covariance =
-      known.bearing_sigma_rad * known.bearing_sigma_rad * basis * basis.transpose();
-  birth.inverse_range = known.estimate.inverse_range;
-  birth.inverse_range_sigma =
-      std::max(dormant.inverse_range_sigma, kLeastDepthSigma * birth.inverse_range);
-  if (!filter_.AddFeature(clone, birth).ok()) return;
-  Landmark& landmark = dormant.landmark;
-  landmark.woken = Landmark::Probation{.failures = dormant.failures};
-  landmark.failed_in_row = 0;
-  landmark.last_matched_frame = landmark.last_in_view_frame = frames_;
-  map_.Add(std::move(landmark));
+bool Tracker::Impl::KeepForAdjustment(const CameraModel& camera) {
+  const double distance_m = 1.0 / std::max(1e-6, depth_.inverse_range);
+  if (!options_.adjust || !map_.HasNews(filter_, distance_m)) return false;
+  const double focal = 0.5 * (camera.intrinsics().fx + camera.intrinsics().fy);
+  std::vector<GraphSighting> sightings;
+  for (const LandmarkMatch& match : matches_.in_view) {
+    if (!match.accepted()) continue;
+    const auto ray = camera.Unproject(match.pixel - match.row_shift);
+    if (!ray) continue;
+    GraphSighting sighting{match.id, ray->normalized(), std::sqrt(match.noise(0, 0)) / focal, {}};
+    if (const auto* known = std::get_if<Eigen::Vector3d>(&match.point)) {
+      sighting.known_point = *known;
+    }
+    sightings.push_back(sighting);
+  }
+  map_.AddKeyframe(filter_, distance_m, options_.pixel_sigma_px / focal, sightings);
+  return true;
 }
 
-void Tracker::Impl::Remember(const CameraModel& camera) {
-  using Life = KeyframeGraph::Life;
-  refiner_.Keep(camera, filter_, matches_, depth_.inverse_range, [this](FeatureId id) {
-    return filter_.Has(id) ? Life::kInFilter : dormant_.Has(id) ? Life::kAtRest : Life::kGone;
-  });
-}
-
-std::optional<Eigen::Vector3d> Tracker::Impl::PointNow(FeatureId id) const {
-  const Landmark* landmark = map_.Find(id);
-  if (landmark != nullptr && landmark->known) return landmark->known->point_in_world;
-  if (landmark != nullptr && filter_.Has(id)) return filter_.Marginal(id).point_in_world;
-  if (!dormant_.Has(id)) return std::nullopt;
-  const auto known = refiner_.Remember(id);
-  if (!known || !(known->estimate.inverse_range > 0.0)) return std::nullopt;
-  return known->PointInWorld();
-}
-
-void Tracker::Impl::LocateDormant() {
-  dormant_.Locate([this](KeyframeId id) { return refiner_.graph().Version(id); },
-                  [this](FeatureId id) { return refiner_.Remember(id); });
-}
-
-void Tracker::Impl::PublishDormant(MapSnapshot& snapshot) const {
+void Tracker::Impl::PublishAtRest(MapSnapshot& snapshot) const {
   const Rigid3 camera_from_world = snapshot.world_from_camera.Inverse();
   const Eigen::Matrix3d turn = camera_from_world.RotationMatrix();
-  for (const auto& [id, dormant] : dormant_.all()) {
+  for (const auto& [id, dormant] : map_.at_rest().all()) {
     if (!dormant.place.somewhere) continue;
     FeatureSnapshot& feature = snapshot.features.emplace_back();
     feature.id = id;

@@ -41,7 +41,7 @@ std::vector<Expected> ShouldBeSeen(const OldLandmarks& old, const Rigid3& pose,
   std::vector<Expected> all;
   const Rigid3 camera_from_old = pose.Inverse();
   for (std::size_t k = 0; k < old.size(); ++k) {
-    const KeyframeGraph::Remembered& known = old[k].second;
+    const KeyframeGraph::Recalled& known = old[k].second;
     const double range = 1.0 / known.estimate.inverse_range;
     const Eigen::Vector3d ray = known.world_from_anchor.rotation * known.estimate.bearing;
     const Eigen::Vector3d point = known.PointInWorld();

@@ -14,7 +14,7 @@
 namespace saccade {
 
 /// Landmarks at rest that the ordinary search has not met for a while: the old side of a loop.
-using OldLandmarks = std::vector<std::pair<const DormantLandmark*, KeyframeGraph::Remembered>>;
+using OldLandmarks = std::vector<std::pair<const DormantLandmark*, KeyframeGraph::Recalled>>;
 
 /// What one frame says of whether the old part of the map is in view.
 struct LoopSight {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/filter/new_clone.hpp"
 #include "server/tracker/line_time.hpp"
 
 namespace saccade {
@@ -174,14 +175,13 @@ int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const Frame
   for (std::size_t k = corners_.size(); k > static_cast<std::size_t>(fixed) + 1; --k) {
     std::swap(corners_[k - 1], corners_[fixed + random() % (k - fixed)]);
   }
-  const AnchorPoseId anchor = filter.AddAnchor();
+  const NewClone clone(filter);
   int planted = 0;
   for (const Corner& corner : corners_) {
     if (planted >= wanted) break;
     planted +=
-        Plant(frame, corner.pixel, depth, anchor, matches.motion, matcher, filter, map) ? 1 : 0;
+        Plant(frame, corner.pixel, depth, clone.id(), matches.motion, matcher, filter, map) ? 1 : 0;
   }
-  filter.Remove({});  // a clone that nothing was planted in goes again
   return planted;
 }
 

@@ -32,7 +32,7 @@ Difficulties Tracker::Impl::SeeDifficulties() const {
 
 std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
                                                           const StageTimes& times) {
-  LocateDormant();
+  map_.LocateAtRest();
   auto snapshot = std::make_shared<MapSnapshot>();
   snapshot->frame_id = frame.id;
   snapshot->capture_time_ns = frame.capture_time_ns;
@@ -51,10 +51,10 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
   snapshot->map_revision = revision_;
   snapshot->map_generation = generation_;
   snapshot->stage_ms = times;
-  snapshot->features.reserve(map_.all().size() + dormant_.size());
+  snapshot->features.reserve(map_.in_use().all().size() + map_.at_rest().size());
   auto match = matches_.in_view.begin();  // both lists have rising ids
   const Eigen::Matrix3d turn = camera.world_from_camera.RotationMatrix();
-  for (const Landmark& landmark : map_.all()) {
+  for (const Landmark& landmark : map_.in_use().all()) {
     FeatureSnapshot& feature = snapshot->features.emplace_back();
     feature.id = landmark.id;
     feature.matched_count = landmark.matched;
@@ -79,7 +79,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
       feature.state = match->accepted() ? FeatureState::kMeasured : FeatureState::kFailed;
     }
   }
-  PublishDormant(*snapshot);
+  PublishAtRest(*snapshot);
   return snapshot;
 }
 

@@ -1,9 +1,11 @@
 // The part of the tracker that finds its way back: keyframes, relocalisation, seeded features.
-#include "server/tracker/recovery.hpp"
-
 #include <absl/strings/str_cat.h>
 
+#include <array>
 #include <cmath>
+
+#include "server/filter/new_clone.hpp"
+#include "server/tracker/tracker_impl.hpp"
 
 namespace saccade {
 namespace {
@@ -26,13 +28,13 @@ void Tracker::Impl::KeepKeyframe(const Frame& frame) {
   const Rigid3& pose = filter_.camera().world_from_camera;
   const double distance = kKeyframeShare / std::max(1e-6, depth_.inverse_range);
   if (!relocaliser_.NeedsKeyframe(pose, distance, kKeyframeAngle_rad)) {
-    relocaliser_.Densify(*frame.camera, [this](FeatureId id) { return PointNow(id); });
+    relocaliser_.Densify(*frame.camera, [this](FeatureId id) { return map_.Where(id, filter_); });
     return;
   }
   std::vector<KeyframePoint> points;
   for (const LandmarkMatch& match : matches_.in_view) {
     if (!match.accepted()) continue;
-    const Landmark* landmark = map_.Find(match.id);
+    const Landmark* landmark = map_.in_use().Find(match.id);
     if (landmark == nullptr || landmark->matched < kMatured) continue;
     if (landmark->known) {
       points.push_back({match.id, match.pixel, landmark->known->point_in_world});
@@ -49,10 +51,10 @@ void Tracker::Impl::KeepKeyframe(const Frame& frame) {
 void Tracker::Impl::Recover(const Frame& frame) {
   matches_ = FrameMatches();
   if (frames_lost_++ % kQueryEvery != 0) return;
-  const auto found =
-      relocaliser_.Query(frame.grey, *frame.camera, [this](FeatureId id) { return PointNow(id); });
+  const auto found = relocaliser_.Query(frame.grey, *frame.camera,
+                                        [this](FeatureId id) { return map_.Where(id, filter_); });
   if (!found) return;
-  before_relocalisation_ = std::make_shared<Backup>(Backup{filter_, map_, dormant_});
+  before_relocalisation_ = map_.Save(filter_);
   if (!Accept(*found, *frame.camera)) {
     Revert();
     return;
@@ -86,13 +88,13 @@ bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camer
   motion.world_from_camera = found.world_from_camera;
   filter_.ResetCamera(motion, sigma.cwiseAbs2().asDiagonal());
   for (const Correspondence& inlier : found.inliers) {
-    const auto known = refiner_.Remember(inlier.id);
-    if (!dormant_.Has(inlier.id) || !known) continue;
-    WakeOne(inlier.id, refiner_.CloneOf(known->anchor, WakeCovariance(unit), filter_), *known);
+    const auto known = map_.Recall(inlier.id);
+    if (!known || map_.StateOf(inlier.id, filter_) != LandmarkState::kAtRest) continue;
+    map_.Wake(known->anchor, std::array{inlier.id}, WakeCovariance(unit), frames_, filter_);
   }
   std::vector<Observation> observations;
   for (const Correspondence& inlier : found.inliers) {
-    const Landmark* landmark = map_.Find(inlier.id);
+    const Landmark* landmark = map_.in_use().Find(inlier.id);
     if (landmark == nullptr) continue;
     Observation observation;
     observation.id = inlier.id;
@@ -105,11 +107,8 @@ bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camer
 }
 
 void Tracker::Impl::Revert() {
-  if (before_relocalisation_ == nullptr) return;
-  filter_ = before_relocalisation_->filter;
-  map_ = before_relocalisation_->map;
-  dormant_ = before_relocalisation_->dormant;
-  refiner_.ForgetClones(filter_);
+  if (!before_relocalisation_) return;
+  map_.Restore(*before_relocalisation_, filter_);
   before_relocalisation_.reset();
 }
 
@@ -161,13 +160,15 @@ absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
   if (!seen.found()) return absl::NotFoundError("feature: not seen in the newest frame");
   const double now = (pose.Inverse() * (world_from_camera * (clicked.bearing * range))).norm();
   const MapKeeper::DepthGuess depth{1.0 / now, depth_sigma_m / depth_prior_m / now};
-  const AnchorPoseId anchor = filter_.AddAnchor();
-  const auto id = keeper_.Plant(last_frame_, seen.pixel, depth, anchor, matches_.motion, matcher_,
-                                filter_, map_);
-  filter_.Remove({});
-  Remember(camera);
+  std::optional<FeatureId> id;
+  {
+    const NewClone clone(filter_);
+    id = keeper_.Plant(last_frame_, seen.pixel, depth, clone.id(), matches_.motion, matcher_,
+                       filter_, map_.in_use());
+  }
+  KeepForAdjustment(camera);
   if (!id) return absl::NotFoundError("feature: no texture to track at this pixel");
-  map_.Find(*id)->seeded = true;
+  map_.in_use().Find(*id)->seeded = true;
   return *id;
 }
 

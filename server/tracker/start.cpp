@@ -16,7 +16,7 @@ constexpr double kAgreeing = 0.75;
 }  // namespace
 
 void Tracker::Impl::SeekStart(const Frame& frame) {
-  finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_, matches_);
+  finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
   const auto found = finder_.Finish(frames_);
   times_.waited_ms = finder_.waited_ms();
   if (found) {
@@ -43,19 +43,15 @@ void Tracker::Impl::TakeOver(const FoundStart& start, const Frame& frame) {
   const std::vector<AnchorPoseId> clones =
       filter_.Seed(start.seed, motion, sigma.cwiseAbs2().asDiagonal());
   home_ = clones.front();
-  std::vector<FeatureId> gone;
-  for (const Landmark& landmark : map_.all()) {
-    if (!landmark.known && !filter_.Has(landmark.id)) gone.push_back(landmark.id);
-  }
-  map_.Remove(gone);
-  dormant_.Clear();
+  map_.BeginAnew(filter_);
   loops_.Reset();  // it reads the relocaliser
   relocaliser_.Clear();
   refiner_.Reset();
   for (const FoundStart::Keyframe& keyframe : start.keyframes) {
+    if (!options_.adjust) break;
     std::optional<AnchorPoseId> clone;
     if (keyframe.anchor >= 0) clone = clones[static_cast<std::size_t>(keyframe.anchor)];
-    refiner_.Take(keyframe.world_from_camera, unit, keyframe.sightings, keyframe.births, clone);
+    map_.TakeKeyframe(keyframe.world_from_camera, unit, keyframe.sightings, keyframe.births, clone);
   }
   std::erase_if(matches_.in_view,
                 [&](const LandmarkMatch& match) { return !filter_.Has(match.id); });

@@ -3,9 +3,9 @@
 #include <cstring>
 
 #include "server/capture/gap.hpp"
+#include "server/filter/new_clone.hpp"
 #include "server/pipeline/stop_watch.hpp"
 #include "server/tracker/encoder_motion.hpp"
-#include "server/tracker/recovery.hpp"
 
 namespace saccade {
 namespace {
@@ -57,7 +57,6 @@ Tracker::Impl::Impl(const SourceInfo& source, const TrackerOptions& options)
       options_(options),
       random_(options.seed),
       filter_(MakeFilterOptions(options, *source.camera)),
-      dormant_(DormantOptions()),
       matcher_(options),
       keeper_(options),
       starter_(source, options),
@@ -71,7 +70,6 @@ void Tracker::Impl::Reset() {
   loops_.Reset();
   filter_.Reset(CameraMotion(), Matrix12d::Zero());
   map_.Clear();
-  dormant_.Clear();
   keeper_.Reset();
   starter_.Reset();
   monitor_.Reset();
@@ -141,7 +139,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Impl::Track(const Frame& frame) {
 void Tracker::Impl::Begin(const Frame& frame) {
   StopWatch watch;
   matches_ = FrameMatches();
-  const auto start = starter_.Try(frame, pyramid_, filter_, map_);
+  const auto start = starter_.Try(frame, pyramid_, filter_, map_.in_use());
   times_.search_ms = watch.Lap_ms();
   if (!start) {
     monitor_.WaitForStart();
@@ -150,10 +148,10 @@ void Tracker::Impl::Begin(const Frame& frame) {
   metric_ = start->metric;
   held_ = metric_ || !options_.start;
   depth_ = start->depth;
-  matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_, MotionStep(), random_);
-  keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/true, matcher_, filter_, map_,
-               random_);
-  started_ = filter_.feature_count() > 0 || !map_.all().empty();
+  matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_.in_use(), MotionStep(), random_);
+  keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/true, matcher_, filter_,
+               map_.in_use(), random_);
+  started_ = filter_.feature_count() > 0 || !map_.in_use().all().empty();
   times_.manage_ms = watch.Lap_ms();
   if (!started_) return;  // nothing to see at all: try again with the next frame
   frames_ = 0;
@@ -162,9 +160,9 @@ void Tracker::Impl::Begin(const Frame& frame) {
   matches_.attempted += born;
   matches_.accepted += born;
   if (held_) {
-    Remember(*frame.camera);
+    KeepForAdjustment(*frame.camera);
   } else {
-    finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_, matches_);
+    finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
   }
   if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
 }
@@ -208,11 +206,11 @@ void Tracker::Impl::PredictAndSearch(const CameraModel& camera, double dt) {
     matches_ = FrameMatches();
     return;
   }
-  matches_ = matcher_.Match(pyramid_, camera, filter_, map_, {dt, noise}, random_);
+  matches_ = matcher_.Match(pyramid_, camera, filter_, map_.in_use(), {dt, noise}, random_);
   if (matches_.surprised && followed) {
     filter_.Inflate(LineariseMotion(before, before.world_from_camera.rotation, dt, wild).q);
     const double searched_px2 = matches_.searched_px2;
-    matches_ = matcher_.Match(pyramid_, camera, filter_, map_, {dt, noise}, random_);
+    matches_ = matcher_.Match(pyramid_, camera, filter_, map_.in_use(), {dt, noise}, random_);
     matches_.searched_px2 += searched_px2;
   }
   times_.search_ms = watch.Lap_ms();
@@ -275,17 +273,16 @@ std::optional<double> Tracker::Impl::MovedPx(const CameraModel& camera, double d
 /// start.
 void Tracker::Impl::KeepTargetPoints(const Frame& frame) {
   constexpr double kDepthSigma = 0.01;  // of the range
-  std::optional<AnchorPoseId> anchor;
+  std::optional<NewClone> clone;
   const Rigid3 camera_from_world = filter_.camera().world_from_camera.Inverse();
   for (const LandmarkMatch& match : matches_.in_view) {
     const auto* point = std::get_if<Eigen::Vector3d>(&match.point);
     if (point == nullptr || !match.accepted()) continue;
-    if (!anchor) anchor = filter_.AddAnchor();
+    if (!clone) clone.emplace(filter_);
     const double inverse = 1.0 / (camera_from_world * *point).norm();
-    keeper_.Plant(frame, match.pixel, {inverse, kDepthSigma * inverse}, *anchor, matches_.motion,
-                  matcher_, filter_, map_);
+    keeper_.Plant(frame, match.pixel, {inverse, kDepthSigma * inverse}, clone->id(),
+                  matches_.motion, matcher_, filter_, map_.in_use());
   }
-  if (anchor) filter_.Remove({});  // a clone that nothing was planted in goes again
 }
 
 void Tracker::Impl::MoveHome() {
@@ -311,7 +308,7 @@ void Tracker::Impl::Manage(const Frame& frame) {
   // A frame in which hardly anything was found says nothing about single features.
   const bool telling = matches_.accepted >= 0.3 * matches_.attempted;
   for (const LandmarkMatch& match : matches_.in_view) {
-    Landmark& landmark = *map_.Find(match.id);
+    Landmark& landmark = *map_.in_use().Find(match.id);
     landmark.last_in_view_frame = frames_;
     if (!match.searched || (!telling && !match.accepted())) continue;
     landmark.Record(match.accepted(), frames_);
@@ -319,16 +316,16 @@ void Tracker::Impl::Manage(const Frame& frame) {
   if (starter_.TargetExpired(frames_) && matches_.accepted > 0) {
     KeepTargetPoints(frame);
     std::vector<FeatureId> expired;
-    for (const Landmark& landmark : map_.all()) {
+    for (const Landmark& landmark : map_.in_use().all()) {
       if (landmark.known) expired.push_back(landmark.id);
     }
-    map_.Remove(expired);
+    map_.in_use().Remove(expired);
     std::erase_if(matches_.in_view, [](const LandmarkMatch& match) {
       return std::holds_alternative<Eigen::Vector3d>(match.point);
     });
   }
   keeper_.Retire(
-      frames_, filter_, map_, [this](std::span<const FeatureId> ids) { Rest(ids); },
+      frames_, filter_, map_.in_use(), [this](std::span<const FeatureId> ids) { Rest(ids); },
       [this](const Landmark& landmark) { return MayRest(landmark); },
       [this](const Landmark& landmark) { return HasMovedFrom(landmark); });
   // With most of the view covered the little that is left is no place to start features from: it
@@ -336,21 +333,24 @@ void Tracker::Impl::Manage(const Frame& frame) {
   const bool covered = matches_.hidden > matches_.attempted;
   if (!held_) {
     if (telling && !covered) {
-      keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
-                   random_);
+      keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_,
+                   map_.in_use(), random_);
     }
     SeekStart(frame);
     return;
   }
   MoveHome();
-  if (refiner_.Finish(frames_, frame.capture_time_ns, depth_.inverse_range, filter_)) ++revision_;
+  if (refiner_.Finish(frames_, frame.capture_time_ns, depth_.inverse_range, map_, filter_)) {
+    ++revision_;
+  }
   times_.waited_ms = refiner_.waited_ms();
   if (!telling || covered) return;
   if (const auto guess = MapKeeper::GuessDepth(filter_, matches_)) depth_ = *guess;
-  keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_, map_,
-               random_);
-  Remember(*frame.camera);
-  refiner_.Start(frames_, frame.capture_time_ns, filter_);
+  keeper_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_,
+               map_.in_use(), random_);
+  if (KeepForAdjustment(*frame.camera)) {
+    refiner_.Start(frames_, frame.capture_time_ns, map_, filter_);
+  }
   KeepKeyframe(frame);
   CloseLoops(frame);
 }

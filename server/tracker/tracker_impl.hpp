@@ -3,7 +3,7 @@
 #include <memory>
 #include <random>
 
-#include "server/map/dormant_landmarks.hpp"
+#include "server/map/map.hpp"
 #include "server/map/relocaliser.hpp"
 #include "server/tracker/advice.hpp"
 #include "server/tracker/frame_matcher.hpp"
@@ -65,19 +65,13 @@ class Tracker::Impl {
   void Rest(std::span<const FeatureId> ids);
   /// Takes landmarks at rest back that should be in view, where the filter has too few.
   void Wake(const CameraModel& camera);
-  void WakeOne(FeatureId id, AnchorPoseId clone, const KeyframeGraph::Remembered& known);
   /// Of where a keyframe was, when its landmarks are woken.
   Matrix6d WakeCovariance(double distance_m) const;
-  /// The refiner remembers this frame.
-  void Remember(const CameraModel& camera);
-  /// Of a feature, in the filter or at rest; nothing if it is neither.
-  std::optional<Eigen::Vector3d> PointNow(FeatureId id) const;
-  /// Landmarks at rest, as the keyframes have them (LocateDormant).
-  void LocateDormant();
-  void PublishDormant(MapSnapshot& snapshot) const;
+  /// Keeps this frame as a keyframe of the map, if it has news; true if it had.
+  bool KeepForAdjustment(const CameraModel& camera);
+  void PublishAtRest(MapSnapshot& snapshot) const;
   OldLandmarks OldOnes() const;
   void CloseLoops(const Frame& frame);
-  void RestTorn(const MapCorrection& correction);
   void MoveMap(const MapCorrection& correction);
   void KeepTargetPoints(const Frame& frame);
   void KeepKeyframe(const Frame& frame);
@@ -94,8 +88,7 @@ class Tracker::Impl {
   TrackerOptions options_;
   std::mt19937_64 random_;
   FilterState filter_;
-  LandmarkMap map_;
-  DormantLandmarks dormant_;
+  Map map_;
   FrameMatcher matcher_;
   MapKeeper keeper_;
   Starter starter_;
@@ -125,8 +118,7 @@ class Tracker::Impl {
   std::uint64_t generation_ = 0;
   FrameMatches matches_;
   StageTimes times_;
-  struct Backup;
-  std::shared_ptr<Backup> before_relocalisation_;
+  std::optional<Map::Checkpoint> before_relocalisation_;
 };
 
 }  // namespace saccade

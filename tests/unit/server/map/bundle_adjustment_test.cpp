@@ -247,8 +247,8 @@ TEST(KeyframeGraph, ForgetsWhatIsAtRestBeforeWhatIsInTheFilter) {
   graph.Add(arc.poses()[5], 2.0, {}, last, odd_ones_rest);
   EXPECT_FALSE(graph.Pose(0).has_value()) << "the oldest of those at rest goes first";
   EXPECT_TRUE(graph.Pose(1).has_value());
-  EXPECT_FALSE(graph.Remember(1).has_value());
-  EXPECT_TRUE(graph.Remember(2).has_value());
+  EXPECT_FALSE(graph.Recall(1).has_value());
+  EXPECT_TRUE(graph.Recall(2).has_value());
 }
 
 TEST(KeyframeGraph, ACameraThatOnlyTurnsHasNothingToAdjust) {

@@ -43,7 +43,7 @@ class DormantLandmarksTest : public testing::Test {
     return ids;
   }
   DormantLandmarks::Lookup Lookup() const {
-    return [this](FeatureId id) -> std::optional<KeyframeGraph::Remembered> {
+    return [this](FeatureId id) -> std::optional<KeyframeGraph::Recalled> {
       const auto at = known_.find(id);
       return at == known_.end() ? std::nullopt : std::optional(at->second);
     };
@@ -55,7 +55,7 @@ class DormantLandmarksTest : public testing::Test {
 
   std::uint64_t version_ = 1;
   CameraModel camera_{Pinhole(640, 480, 500)};
-  std::map<FeatureId, KeyframeGraph::Remembered> known_;
+  std::map<FeatureId, KeyframeGraph::Recalled> known_;
   DormantLandmarks dormant_{DormantOptions()};
 };
 
