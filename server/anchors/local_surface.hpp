@@ -33,7 +33,7 @@ struct SurfaceDepth {
 ///   the weighted median of what is near, with sigma options.median_depth_sigma,
 ///   the weighted median of everything, with sigma options.far_depth_sigma.
 /// A plane predicts at the ray itself, so it beats a feature 15 px away that may lie on something
-/// else; a feature within 6 px that contradicts the plane beats it. See README.md.
+/// else; a feature within 6 px that contradicts the plane beats it. docs/derivations/anchors.md.
 /// Nothing if no sample has a usable depth.
 std::optional<SurfaceDepth> EstimateDepth(const std::vector<SurfaceSample>& samples,
                                           double radians_per_px, bool metric,

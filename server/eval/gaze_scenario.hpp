@@ -13,8 +13,8 @@ bool IsGazeScenario(const std::string& name);
 /// Their names, for people.
 std::string GazeScenarioNames();
 
-/// Runs one (README.md says what each does) and answers with the report; null where a figure does
-/// not belong to the scenario.
+/// Runs one (docs/design/evaluation.md says what each does) and answers with the report; null where
+/// a figure does not belong to the scenario.
 absl::StatusOr<nlohmann::ordered_json> RunGazeScenario(const SimArguments& arguments);
 
 }  // namespace saccade

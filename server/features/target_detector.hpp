@@ -33,7 +33,7 @@ struct TargetObservation {
 /// The board looks the same after half a turn. Which corner is (0, 0) is decided by `predicted`
 /// (world_from_camera, if known), else by target.hint_px, else corner (0, 0) is the one more up and
 /// left. NotFound: no whole board in view. FailedPrecondition: corners do not fit a plane seen by
-/// this camera (rms above 2 px). Meant for the start; times in README.md.
+/// this camera (rms above 2 px). Meant for the start; times in docs/measurements.
 absl::StatusOr<TargetObservation> DetectChessboard(const ImagePyramid& pyramid,
                                                    const CameraModel& camera,
                                                    const ChessboardTarget& target,

@@ -92,7 +92,7 @@ struct MapSeed {
 
 struct FilterOptions {
   /// Jacobians at first estimates (slam-spec 1): always, or for the first updates of a map, while
-  /// the present ones still jump. README: update.
+  /// the present ones still jump. docs/derivations/first-estimates.md.
   bool fej = false;
   int fej_updates = 60;
   PointForm form = PointForm::kBearingRange;
@@ -100,11 +100,11 @@ struct FilterOptions {
   /// given, not estimated.
   double readout_s = 0.0;
   double readout_sigma_s = 0.0;
-  /// Updates after which a change of scale is kept unobserved (README: scale); before, the first
-  /// depths are still being sorted out.
+  /// Updates after which a change of scale is kept unobserved (docs/derivations/scale.md); before,
+  /// the first depths are still being sorted out.
   int carry_scale_after = 60;
   /// Inverse ranges whose clone's matches a turn alone explains to within this many standard
-  /// deviations are left as they are (README: parallax); 0: always corrected.
+  /// deviations are left as they are (docs/derivations/parallax.md); 0: always corrected.
   double parallax_sigmas = 3.0;
   double min_inverse_range = 1e-4;  // [1/m]; of points given in metres (the state may pass 0)
 };
@@ -112,8 +112,8 @@ struct FilterOptions {
 /// State and covariance of one moving camera and its map (slam-spec 1, 2, 5.4).
 ///
 /// x = [camera 12 | read-out 1, if estimated | pose clones 6 each and features 3 or 1 each, as they
-/// were born]. The covariance is private: it changes by Predict(), Update(), and the augmenting and
-/// removing calls, nothing else. Not thread-safe. Derivations: README.md.
+/// were born]. The covariance is private: docs/derivations/state.md lists the calls that change it,
+/// and how. Not thread-safe.
 class FilterState {
  public:
   static constexpr int kCameraDim = 12;
@@ -153,8 +153,8 @@ class FilterState {
   /// Carries the camera `dt` seconds on, in steps of at most 1/30 s up to a second, and in 30 steps
   /// beyond: the cost does not grow with a gap. `head`: what its joints did in
   /// these `dt` seconds, if that is known; then camera()'s velocities are the wearer's alone
-  /// (README: head). Velocities given to Reset() and ResetCamera() are the wearer's wherever the
-  /// head is known.
+  /// (docs/derivations/prediction.md). Velocities given to Reset() and ResetCamera() are the
+  /// wearer's wherever the head is known.
   void Predict(double dt, const MotionNoise& noise, const HeadMotion* head = nullptr);
   /// camera(), with velocities that include what the joints do.
   CameraMotion WholeMotion() const;
@@ -195,19 +195,20 @@ class FilterState {
   void Mark();
   void DropMark();
   /// Moves the estimates of the mark to better ones, found elsewhere from the same measurements
-  /// (README: bundle adjustment), and the present ones to where they would be had that been known
-  /// then. The covariance is carried along, neither smaller nor larger. Ends the mark; does nothing
-  /// without one.
+  /// (docs/derivations/bundle-adjustment.md), and the present ones to where they would be had that
+  /// been known then. The covariance is carried along, neither smaller nor larger. Ends the mark;
+  /// does nothing without one.
   void Refine(const Refinement& refinement);
 
   /// From here on errors are counted from this clone: its pose defines the world, and has no error
-  /// (README: gauge; Baarda's S-transformation). Estimates stay, and so does every uncertainty of
-  /// one thing seen from another. False, and nothing is done: the clone is unknown, or Jacobians
-  /// are at first estimates, which learn nothing of where the world is. O(n^2).
+  /// (docs/derivations/gauge.md; Baarda's S-transformation). Estimates stay, and so does every
+  /// uncertainty of one thing seen from another. False, and nothing is done: the clone is unknown,
+  /// or Jacobians are at first estimates, which learn nothing of where the world is. O(n^2).
   bool CountErrorsFrom(AnchorPoseId anchor);
 
   /// Everything is somewhere else in a world that is turned, moved and of another scale: the same
-  /// state in other coordinates, to the last correlation (README: gauge). Ends the mark. O(n^2).
+  /// state in other coordinates, to the last correlation (docs/derivations/gauge.md). Ends the
+  /// mark. O(n^2).
   void MoveWorld(const Similarity3& world_from_before);
 
   /// How surely a clone's direction is known from where errors are counted [rad]; unknown: 0.
@@ -273,7 +274,7 @@ class FilterState {
                                                   Journal::Updated& record);
   void Correct(const Eigen::VectorXd& error);
   /// Carries the covariance along when estimates move by `step`: a scale error then moves them by
-  /// what they are now, not by what they were (README: scale).
+  /// what they are now, not by what they were (docs/derivations/scale.md).
   void CarryScale(const Eigen::VectorXd& step);
 
   /// Estimates as they were, and how their errors have changed since.

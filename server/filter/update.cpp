@@ -297,7 +297,7 @@ absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
       information ? InformationStep(*all, report, record) : KalmanStep(*all, report, record);
   if (!error.ok()) return error.status();
   JudgeNoise(report);
-  // Partial update (README: parallax): inverse ranges take only a share of their gain.
+  // Partial update (docs/derivations/parallax.md): inverse ranges take only a share of their gain.
   VectorXd kept = KeptShares(turned);
   if (readout_offset_ >= 0) {
     kept.conservativeResize(kept.size() + 1);

@@ -14,7 +14,7 @@ class OsmesaContext final : public GlContext {
  public:
   OsmesaContext() {
     // The picture is drawn on the calling thread plus one rasteriser thread, unless the user says
-    // otherwise: tracker and encoder need the other cores (measured in README.md).
+    // otherwise: tracker and encoder need the other cores (measured 2026-11-22).
     ::setenv("LP_NUM_THREADS", "1", /*overwrite=*/0);
     const std::array<int, 13> attributes = {OSMESA_FORMAT,
                                             OSMESA_BGRA,

@@ -33,7 +33,8 @@ struct DynamixelOptions {
 
   /// InvalidArgument names the field, its value and what it may be.
   absl::Status Validate() const;
-  /// Reads the [dynamixel] table (README.md lists the keys); a file without one changes nothing.
+  /// Reads the [dynamixel] table (docs/configuration.md lists the keys); a file without one changes
+  /// nothing.
   absl::Status LoadToml(const std::filesystem::path& file);
   /// What follows "dynamixel:": DEVICE[?baud=N]. It wins over the file.
   absl::Status ReadUri(const std::string& rest);

@@ -51,7 +51,7 @@ struct MountCalibration {
 };
 
 /// Finds axes, link offsets, encoder signs and zeros, and delays from the camera's poses beside the
-/// encoders' readings, by robust nonlinear least squares (README, Calibration). Pure;
+/// encoders' readings, by robust nonlinear least squares (docs/derivations/mount.md). Pure;
 /// deterministic.
 ///   FailedPrecondition  too few pictures or readings, nothing moved, or the residuals are beyond
 ///                       what a standing base can cause: says which, and the remedy

@@ -15,8 +15,8 @@ struct FixationAngles {
   double miss_rad = 0;    // angle between the optic axis at `angles` and the point
 };
 
-/// Kinematics of a mount (slam-spec section 8; README.md derives them). Frames: `mount` is the base
-/// on the wearer (S), `camera` the optic centre (C); both x right, y down, z forward at zero.
+/// Kinematics of a mount (slam-spec section 8; docs/derivations/mount.md). Frames: `mount` is the
+/// base on the wearer (S), `camera` the optic centre (C); both x right, y down, z forward at zero.
 /// Immutable.
 class MountModel {
  public:

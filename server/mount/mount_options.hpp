@@ -45,8 +45,8 @@ struct MountOptions {
 
   /// InvalidArgument names the field, its value and what it may be.
   absl::Status Validate() const;
-  /// Reads the [mount_model] table of a TOML file over the present values (README.md lists the
-  /// keys); a file without one changes nothing.
+  /// Reads the [mount_model] table of a TOML file over the present values (docs/configuration.md
+  /// lists the keys); a file without one changes nothing.
   ///   NotFound         no such file
   ///   InvalidArgument  not TOML, unknown key, wrong type or range: names file, key and remedy
   absl::Status LoadToml(const std::filesystem::path& file);

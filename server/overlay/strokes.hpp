@@ -56,7 +56,7 @@ struct AxisStroke {
   std::optional<Eigen::Vector2d> end_px;
 };
 
-/// Marks of the annotations in a view: exact definitions in server/overlay/README.md, which the
+/// Marks of the annotations in a view: exact definitions in docs/design/overlay.md, which the
 /// page follows too. Stopped annotations and those whose place is not known have none. Points
 /// behind the camera, not finite or beyond the lens leave gaps, never NaN.
 Marks AnnotationMarks(const CameraModel& camera, const Rigid3& world_from_camera,

@@ -15,13 +15,13 @@ enum class SimExposure { kOff, kDrift, kScene };
 /// How the wearer begins: at rest before the chessboard, or turning towards it.
 enum class SimStart { kRest, kTurn };
 
-/// What the simulated wearer does (README.md describes each).
+/// What the simulated wearer does (docs/configuration.md describes each).
 enum class SimMotion { kDesk, kSway, kWalk, kTurn, kStill, kStand, kRock, kRoll, kStroll, kTwist };
 
 /// `sim:desk?key=value&...`. Every key is optional.
 struct SimOptions {
   std::uint64_t seed = 1;  // seed: textures, small differences of the room, motion, noise
-  SimMotion motion = SimMotion::kDesk;  // motion: desk sway walk ... (README.md)
+  SimMotion motion = SimMotion::kDesk;  // motion: desk sway walk ... (configuration.md)
   std::optional<double> duration_s;     // duration: frames end after it; absent: never
   double noise = 1.5;                   // noise: sigma at mid grey [grey levels]; 0: none
   bool blur = true;                     // blur: motion blur of the exposure, on or off
@@ -33,7 +33,7 @@ struct SimOptions {
   LensModel lens = LensModel::kBrownConrady;        // lens: pinhole, brown_conrady
   double supersampling = 1.15;  // supersampling: drawn pixels per camera pixel, 1 .. 4
 
-  // What real pictures have (README.md, real pictures); `real=on` sets them all.
+  // What real pictures have (docs/measurements); `real=on` sets them all.
   double vignetting = 0.14;          // vignetting: light that the corners lose
   double lens_error_px = 0.0;        // lens_error_px: of the told calibration, in the corners
   double rolling_shutter_s = 0.0;    // rolling_shutter_ms: read-out, first row to last
@@ -56,7 +56,7 @@ struct SimOptions {
   CameraIntrinsics TrueIntrinsics() const;
   /// When frame `frame` is exposed (its middle) [s].
   double TimeOf(std::uint64_t frame) const;
-  /// Sets everything to what was measured on real recordings (README.md).
+  /// Sets everything to what was measured on real recordings (docs/measurements).
   void MakeReal();
 };
 

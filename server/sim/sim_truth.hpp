@@ -31,7 +31,7 @@ struct SimTruth {
   std::vector<SimObject> objects;
 };
 
-/// One line of `--sim-truth`; README.md describes the fields.
+/// One line of `--sim-truth`; docs/design/simulator.md describes the fields.
 std::string ToJsonLine(const SimTruth& truth);
 
 /// Writes truth line by line; each line is complete on disk before the frame is handed out.

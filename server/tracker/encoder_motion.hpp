@@ -6,7 +6,7 @@
 namespace saccade {
 
 /// What the joints did to the camera from one frame to the next, `dt` seconds later, by its
-/// encoders' readings (README: head motion).
+/// encoders' readings (docs/derivations/prediction.md).
 ///
 /// The covariance is that of two independent readings, each wrong by the encoders' sigma and by
 /// what the joint moves within the time stamps' error. `metric` false: the map's unit is unknown,

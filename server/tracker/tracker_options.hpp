@@ -77,7 +77,7 @@ struct TrackerOptions {
 
   /// A place that is recognised while tracking, and further off than the search reaches, moves the
   /// map; false: only what the search finds closes a loop. Off: measured on one corridor, it brings
-  /// the camera closer (56 to 23 cm), but not the marks (README, Open).
+  /// the camera closer (56 to 23 cm), but not the marks (docs/derivations/loops.md).
   bool loops = false;
 
   // State machine (slam-spec 2).
