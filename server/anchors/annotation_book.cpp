@@ -43,7 +43,7 @@ absl::StatusOr<std::unique_ptr<AnnotationBook>> AnnotationBook::Open(
   absl::StatusOr<StoredAnnotations> stored = book->store_->LoadAll();
   if (!stored.ok()) return stored.status();
   for (AnsweredRequest& request : stored->requests) {
-    book->Remember(request.request_id, {std::move(request.annotation_id), 0});
+    book->Keep(request.request_id, {std::move(request.annotation_id), 0});
   }
   book->anchors_.Load(std::move(stored->annotations));
   return book;
@@ -60,7 +60,7 @@ AnnotationBook::~AnnotationBook() {
   for (const auto& answer : owed_->Take()) answer();
 }
 
-void AnnotationBook::Remember(const std::string& request_id, AnsweredCreate answered) {
+void AnnotationBook::Keep(const std::string& request_id, AnsweredCreate answered) {
   if (request_id.empty()) return;
   requests_[request_id] = std::move(answered);
   request_order_.push_back(request_id);
@@ -135,7 +135,7 @@ void AnnotationBook::Create(const AnnotationDraft& draft, const std::string& ses
   if (AnswerAgain(draft.request_id, done)) return;
   absl::StatusOr<AnnotationEdit> edit = anchors_.Create(draft, session_id);
   if (!edit.ok()) return done(edit.status());
-  Remember(draft.request_id, {edit->change.id, edit->change.sequence});
+  Keep(draft.request_id, {edit->change.id, edit->change.sequence});
   Commit(*std::move(edit), std::move(done));
 }
 

@@ -74,7 +74,7 @@ class AnnotationBook {
 
   /// Answers a Create that was made before; false if it was not.
   bool AnswerAgain(const std::string& request_id, const AnnotationDone& done);
-  void Remember(const std::string& request_id, AnsweredCreate answered);
+  void Keep(const std::string& request_id, AnsweredCreate answered);
   void Commit(AnnotationEdit edit, AnnotationDone done);
   void TakeBack(absl::StatusOr<AnnotationEdit> edit, DescriptionDone done);
 
