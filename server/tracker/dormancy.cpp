@@ -1,68 +1,22 @@
-// The part of the tracker that puts landmarks to rest and wakes them.
-#include "server/tracker/tracker_impl.hpp"
+// The part of the tracker that wakes landmarks, and keeps frames for adjustment.
+#include "server/tracker/tracker.hpp"
 
 namespace saccade {
 namespace {
 
-// Well enough known to be found again.
-constexpr std::uint32_t kMature = 15;     // matches
-constexpr double kDepthKnown = 0.1;       // sigma / inverse range
-constexpr double kSeedDepthKnown = 0.02;  // the same of a seeded one: a mark waits for its depth
-constexpr double kMoved = 0.1;            // of the distance to what is in view
-constexpr std::int64_t kPause = 150;      // frames that one rests which was woken in vain
-constexpr int kMostFailures = 3;
 constexpr int kMostAtOnce = 30;
-
-/// How often it was woken in vain.
-int Failures(const Landmark& landmark) {
-  if (!landmark.woken) return 0;
-  return landmark.woken->failures + (MapKeeper::FailsProbation(landmark) ? 1 : 0);
-}
 
 }  // namespace
 
-bool Tracker::Impl::MayRest(const Landmark& landmark) const {
-  if (!options_.wake || landmark.known || landmark.matched < kMature ||
-      Failures(landmark) >= kMostFailures || !filter_.Has(landmark.id) ||
-      !map_.Recall(landmark.id)) {
-    return false;
-  }
-  const FeatureMarginal marginal = filter_.Marginal(landmark.id);
-  const double enough = landmark.seeded ? kSeedDepthKnown : kDepthKnown;
-  return marginal.inverse_range_sigma <= enough * marginal.inverse_range;
-}
-
-bool Tracker::Impl::HasMovedFrom(const Landmark& landmark) const {
-  const auto known = map_.Recall(landmark.id);
-  if (!known) return false;
-  const Eigen::Vector3d way =
-      filter_.camera().world_from_camera.translation - known->world_from_anchor.translation;
-  return way.norm() * depth_.inverse_range > kMoved;
-}
-
-void Tracker::Impl::Rest(std::span<const FeatureId> ids) {
-  const auto judge = [this](const Landmark& landmark) -> std::optional<RestNote> {
-    if (!MayRest(landmark)) return std::nullopt;
-    // What was woken in vain has taught the filter nothing.
-    const bool failed = MapKeeper::FailsProbation(landmark);
-    return RestNote{.home = home_,
-                    .rests_until = failed ? frames_ + kPause : 0,
-                    .failures = Failures(landmark),
-                    .learnt = !failed};
-  };
-  map_.Retire(ids, judge, filter_);
-  map_.LocateAtRest();
-}
-
-Matrix6d Tracker::Impl::WakeCovariance(double distance_m) const {
+Matrix6d Tracker::WakeCovariance(double distance_m) const {
   Eigen::Matrix<double, 6, 1> sigma;
   sigma << Eigen::Vector3d::Constant(options_.wake_position_share * distance_m),
       Eigen::Vector3d::Constant(options_.wake_angle_sigma_rad);
   return sigma.cwiseAbs2().asDiagonal();
 }
 
-void Tracker::Impl::Wake(const CameraModel& camera) {
-  const int missing = std::min(kMostAtOnce, keeper_.Missing(matches_));
+void Tracker::Wake(const CameraModel& camera) {
+  const int missing = std::min(kMostAtOnce, births_.Missing(matches_));
   if (!options_.wake || missing <= 0 || map_.at_rest().size() == 0) return;
   map_.LocateAtRest();
   std::vector<Eigen::Vector2d> occupied;
@@ -75,7 +29,7 @@ void Tracker::Impl::Wake(const CameraModel& camera) {
   }
 }
 
-bool Tracker::Impl::KeepForAdjustment(const CameraModel& camera) {
+bool Tracker::KeepForAdjustment(const CameraModel& camera) {
   const double distance_m = 1.0 / std::max(1e-6, depth_.inverse_range);
   if (!options_.adjust || !map_.HasNews(filter_, distance_m)) return false;
   const double focal = 0.5 * (camera.intrinsics().fx + camera.intrinsics().fy);
@@ -94,7 +48,7 @@ bool Tracker::Impl::KeepForAdjustment(const CameraModel& camera) {
   return true;
 }
 
-void Tracker::Impl::PublishAtRest(MapSnapshot& snapshot) const {
+void Tracker::PublishAtRest(MapSnapshot& snapshot) const {
   const Rigid3 camera_from_world = snapshot.world_from_camera.Inverse();
   const Eigen::Matrix3d turn = camera_from_world.RotationMatrix();
   for (const auto& [id, dormant] : map_.at_rest().all()) {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "server/tracker/tracker_impl.hpp"
+#include "server/tracker/tracker.hpp"
 
 namespace saccade {
 namespace {
@@ -13,7 +13,7 @@ constexpr double kTorn = 0.02;      // of the distance: between where two keyfra
 }  // namespace
 
 /// Landmarks at rest that were not met for 5 s, or were looked for in vain where they should be.
-OldLandmarks Tracker::Impl::OldOnes() const {
+OldLandmarks Tracker::OldOnes() const {
   OldLandmarks old;
   for (const auto& [id, dormant] : map_.at_rest().all()) {
     if (dormant.failures == 0 && dormant.landmark.last_matched_frame > frames_ - kOld) continue;
@@ -23,7 +23,7 @@ OldLandmarks Tracker::Impl::OldOnes() const {
   return old;
 }
 
-void Tracker::Impl::CloseLoops(const Frame& frame) {
+void Tracker::CloseLoops(const Frame& frame) {
   if (!options_.loops || !options_.wake || !options_.adjust) return;
   const auto is_known = [](const LandmarkMatch& match) {
     return std::holds_alternative<Eigen::Vector3d>(match.point);
@@ -45,7 +45,7 @@ void Tracker::Impl::CloseLoops(const Frame& frame) {
 
 /// The old part stays, and so does where the world began: whatever hangs on the first keyframes or
 /// a target does not move. The filter is the same in other coordinates.
-void Tracker::Impl::MoveMap(const MapCorrection& correction) {
+void Tracker::MoveMap(const MapCorrection& correction) {
   refiner_.Drop(filter_);
   map_.Move(correction, kTorn / depth_.inverse_range, filter_);
   relocaliser_.Move([&](FeatureId id) -> std::optional<Similarity3> {

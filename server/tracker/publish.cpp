@@ -1,5 +1,5 @@
 // The part of the tracker that tells others what it knows.
-#include "server/tracker/tracker_impl.hpp"
+#include "server/tracker/tracker.hpp"
 
 namespace saccade {
 namespace {
@@ -17,7 +17,7 @@ Eigen::Matrix3d KnownInCamera(const FilterState& filter, const Eigen::Vector3d& 
 
 }  // namespace
 
-Difficulties Tracker::Impl::SeeDifficulties() const {
+Difficulties Tracker::SeeDifficulties() const {
   constexpr int kFollowed = 8;            // matches...
   constexpr double kFollowedShare = 0.3;  // ...and of the searches
   Difficulties seen;
@@ -30,8 +30,7 @@ Difficulties Tracker::Impl::SeeDifficulties() const {
   return seen;
 }
 
-std::shared_ptr<const MapSnapshot> Tracker::Impl::Publish(const Frame& frame,
-                                                          const StageTimes& times) {
+std::shared_ptr<const MapSnapshot> Tracker::Publish(const Frame& frame, const StageTimes& times) {
   map_.LocateAtRest();
   auto snapshot = std::make_shared<MapSnapshot>();
   snapshot->frame_id = frame.id;

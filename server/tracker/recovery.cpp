@@ -5,7 +5,8 @@
 #include <cmath>
 
 #include "server/filter/new_clone.hpp"
-#include "server/tracker/tracker_impl.hpp"
+#include "server/tracker/depth_knowledge.hpp"
+#include "server/tracker/tracker.hpp"
 
 namespace saccade {
 namespace {
@@ -23,7 +24,7 @@ constexpr double kFoundSigma_px = 1.5;
 
 }  // namespace
 
-void Tracker::Impl::KeepKeyframe(const Frame& frame) {
+void Tracker::KeepKeyframe(const Frame& frame) {
   if (monitor_.status() != TrackingStatus::kTracking || loops_.ReadsRelocaliser()) return;
   const Rigid3& pose = filter_.camera().world_from_camera;
   const double distance = kKeyframeShare / std::max(1e-6, depth_.inverse_range);
@@ -40,7 +41,7 @@ void Tracker::Impl::KeepKeyframe(const Frame& frame) {
       points.push_back({match.id, match.pixel, landmark->known->point_in_world});
     } else if (filter_.Has(match.id)) {
       const FeatureMarginal marginal = filter_.Marginal(match.id);
-      if (marginal.inverse_range_sigma > 0.2 * marginal.inverse_range) continue;
+      if (!KnownTo(marginal, DepthKnowledge::kToRecognise)) continue;
       points.push_back({match.id, match.pixel, marginal.point_in_world});
     }
   }
@@ -48,7 +49,7 @@ void Tracker::Impl::KeepKeyframe(const Frame& frame) {
   relocaliser_.AddKeyframe(frame.id, frame.grey, pose, points).IgnoreError();
 }
 
-void Tracker::Impl::Recover(const Frame& frame) {
+void Tracker::Recover(const Frame& frame) {
   matches_ = FrameMatches();
   if (frames_lost_++ % kQueryEvery != 0) return;
   const auto found = relocaliser_.Query(frame.grey, *frame.camera,
@@ -64,9 +65,9 @@ void Tracker::Impl::Recover(const Frame& frame) {
   monitor_.BeginRelocalisation();
 }
 
-void Tracker::Impl::ResumeAfterGap() {
+void Tracker::ResumeAfterGap() {
   has_frame_ = false;  // encoders and rates of the frame before say nothing of this one
-  head_rate_rad_s_ = 0.0;
+  suspension_.Forget();
   if (!started_) return;
   Revert();
   if (monitor_.status() == TrackingStatus::kInitialising || relocaliser_.size() == 0) {
@@ -77,7 +78,7 @@ void Tracker::Impl::ResumeAfterGap() {
   frames_lost_ = 0;  // the next frame is asked at once
 }
 
-bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camera) {
+bool Tracker::Accept(const Relocalisation& found, const CameraModel& camera) {
   const double unit = 1.0 / std::max(1e-6, depth_.inverse_range);
   Vector12d sigma;
   sigma << Eigen::Vector3d::Constant(kPositionShare * unit),
@@ -106,16 +107,16 @@ bool Tracker::Impl::Accept(const Relocalisation& found, const CameraModel& camer
   return filter_.Update(camera, observations, found.world_from_camera).ok();
 }
 
-void Tracker::Impl::Revert() {
+void Tracker::Revert() {
   if (!before_relocalisation_) return;
   map_.Restore(*before_relocalisation_, filter_);
   before_relocalisation_.reset();
 }
 
-absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
-                                                     const Rigid3& world_from_camera,
-                                                     const Eigen::Vector2d& pixel,
-                                                     double depth_prior_m, double depth_sigma_m) {
+absl::StatusOr<FeatureId> Tracker::SeedFeature(const Frame& clicked_frame,
+                                               const Rigid3& world_from_camera,
+                                               const Eigen::Vector2d& pixel, double depth_prior_m,
+                                               double depth_sigma_m) {
   if (!started_ || monitor_.status() != TrackingStatus::kTracking) {
     return absl::FailedPreconditionError("feature: the tracker is not tracking now");
   }
@@ -131,7 +132,7 @@ absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
   ImagePyramid clicked_pyramid;
   if (const absl::Status built = clicked_pyramid.Build(clicked_frame.grey); !built.ok())
     return built;
-  if (!keeper_.CornerNear(clicked_pyramid, pixel, kCornerRadius_px)) {
+  if (!births_.CornerNear(clicked_pyramid, pixel, kCornerRadius_px)) {
     return absl::NotFoundError("feature: no corner to track at this pixel");
   }
   const auto patch = CutPatch(clicked_frame.grey, pixel, clicked_frame.camera);
@@ -159,11 +160,11 @@ absl::StatusOr<FeatureId> Tracker::Impl::SeedFeature(const Frame& clicked_frame,
   const SearchResult seen = PatchSearcher(search).Find(pyramid_, look, expected->pixel, spread);
   if (!seen.found()) return absl::NotFoundError("feature: not seen in the newest frame");
   const double now = (pose.Inverse() * (world_from_camera * (clicked.bearing * range))).norm();
-  const MapKeeper::DepthGuess depth{1.0 / now, depth_sigma_m / depth_prior_m / now};
+  const Births::DepthGuess depth{1.0 / now, depth_sigma_m / depth_prior_m / now};
   std::optional<FeatureId> id;
   {
     const NewClone clone(filter_);
-    id = keeper_.Plant(last_frame_, seen.pixel, depth, clone.id(), matches_.motion, matcher_,
+    id = births_.Plant(last_frame_, seen.pixel, depth, clone.id(), matches_.motion, matcher_,
                        filter_, map_.in_use());
   }
   KeepForAdjustment(camera);

@@ -1,5 +1,5 @@
 // The part of the tracker that begins without a target (slam-spec 7).
-#include "server/tracker/tracker_impl.hpp"
+#include "server/tracker/tracker.hpp"
 
 namespace saccade {
 namespace {
@@ -15,7 +15,7 @@ constexpr double kAgreeing = 0.75;
 
 }  // namespace
 
-void Tracker::Impl::SeekStart(const Frame& frame) {
+void Tracker::SeekStart(const Frame& frame) {
   finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
   const auto found = finder_.Finish(frames_);
   times_.waited_ms = finder_.waited_ms();
@@ -27,7 +27,7 @@ void Tracker::Impl::SeekStart(const Frame& frame) {
   }
 }
 
-void Tracker::Impl::TakeOver(const FoundStart& start, const Frame& frame) {
+void Tracker::TakeOver(const FoundStart& start, const Frame& frame) {
   const double unit = 1.0 / start.inverse_range;
   const double elapsed = Seconds(frame.capture_time_ns - start.newest_time_ns);
   CameraMotion motion = filter_.WholeMotion();

@@ -22,7 +22,7 @@ Matrix12d MotionCovariance(const Matrix6d& pose, double velocity, double angular
   return covariance;
 }
 
-MapKeeper::DepthGuess AtMedianRange(std::span<const Eigen::Vector3d> points, const Rigid3& pose) {
+Births::DepthGuess AtMedianRange(std::span<const Eigen::Vector3d> points, const Rigid3& pose) {
   std::vector<double> ranges;
   for (const Eigen::Vector3d& point : points) ranges.push_back((point - pose.translation).norm());
   std::nth_element(ranges.begin(), ranges.begin() + ranges.size() / 2, ranges.end());

@@ -8,7 +8,7 @@
 #include "server/features/image_pyramid.hpp"
 #include "server/filter/filter_state.hpp"
 #include "server/map/landmark.hpp"
-#include "server/tracker/map_keeper.hpp"
+#include "server/tracker/births.hpp"
 #include "server/tracker/tracker_options.hpp"
 
 namespace saccade {
@@ -16,7 +16,7 @@ namespace saccade {
 /// How a map began.
 struct Start {
   bool metric = false;
-  MapKeeper::DepthGuess depth;  // for the first features
+  Births::DepthGuess depth;  // for the first features
 };
 
 /// Gives the world its frame and scale: by the target where the place has one and it comes into

@@ -1,34 +1,300 @@
 #include "server/tracker/tracker.hpp"
 
-#include "server/tracker/tracker_impl.hpp"
+#include "server/capture/gap.hpp"
+#include "server/pipeline/stop_watch.hpp"
+#include "server/tracker/encoder_motion.hpp"
+#include "server/tracker/home.hpp"
+#include "server/tracker/same_picture.hpp"
+#include "server/tracker/settling.hpp"
+#include "server/tracker/surprise.hpp"
+#include "server/tracker/target_expiry.hpp"
 
 namespace saccade {
+namespace {
+
+constexpr int kFewestToUpdate = 3;  // matches: fewer can agree by chance
+constexpr int kRepeats = 2;         // of a picture, as a source does that fills up its rate
+constexpr int kYoungMap = 60;       // frames tracked in it, before it is worth waiting for
+constexpr int kPatience = 30;       // frames lost, before a young map is given up
+
+/// The camera's own word on its shutter, else the filter finds out.
+FilterOptions MakeFilterOptions(const TrackerOptions& options, const CameraModel& camera) {
+  constexpr double kSurely = 0.1;  // of a read-out time that camera.yaml gives
+  FilterOptions filter;
+  filter.readout_s = camera.intrinsics().rolling_shutter_readout_s;
+  filter.readout_sigma_s =
+      filter.readout_s > 0.0 ? kSurely * filter.readout_s : options.readout_sigma_s;
+  filter.fej = options.fej;
+  filter.fej_updates = options.fej_updates;
+  filter.parallax_sigmas = options.parallax_sigmas;
+  filter.carry_scale_after = options.carry_scale_after;
+  filter.form = options.range_only ? PointForm::kRangeOnly : PointForm::kBearingRange;
+  return filter;
+}
+
+RelocaliserOptions MakeRelocaliserOptions(const TrackerOptions& options) {
+  RelocaliserOptions relocaliser;
+  relocaliser.seed = options.seed;
+  return relocaliser;
+}
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<Tracker>> Tracker::Create(const SourceInfo& source,
                                                          const TrackerOptions& options) {
   if (const absl::Status status = options.Validate(); !status.ok()) return status;
   if (const absl::Status status = Starter::Check(source); !status.ok()) return status;
-  return std::unique_ptr<Tracker>(new Tracker(std::make_unique<Impl>(source, options)));
+  return std::unique_ptr<Tracker>(new Tracker(source, options));
 }
 
-Tracker::Tracker(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Tracker::~Tracker() = default;
+Tracker::Tracker(const SourceInfo& source, const TrackerOptions& options)
+    : source_(source),
+      options_(options),
+      random_(options.seed),
+      filter_(MakeFilterOptions(options, *source.camera)),
+      matcher_(options),
+      births_(options),
+      retirement_(options),
+      starter_(source, options),
+      monitor_(options),
+      relocaliser_(MakeRelocaliserOptions(options)),
+      refiner_(options),
+      finder_(options),
+      loops_(options, relocaliser_),
+      suspension_(options.suspend_rate_rad_s) {}
+
+void Tracker::Reset() {
+  loops_.Reset();
+  filter_.Reset(CameraMotion(), Matrix12d::Zero());
+  map_.Clear();
+  births_.Reset();
+  starter_.Reset();
+  monitor_.Reset();
+  relocaliser_.Clear();
+  refiner_.Reset();
+  finder_.Reset();
+  matches_ = FrameMatches();
+  before_relocalisation_.reset();
+  started_ = metric_ = held_ = has_frame_ = false;
+  suspension_.Forget();
+  frames_ = frames_lost_ = frames_tracked_ = 0;
+  home_ = 1;
+  ++generation_;
+  ++revision_;
+}
+
+void Tracker::StartAnew(const Frame& frame) {
+  Reset();
+  last_frame_ = frame;
+  has_frame_ = true;
+  Begin(frame);
+}
+
+bool Tracker::Hopeless() const {
+  if (!held_) return true;
+  return !metric_ && frames_tracked_ < kYoungMap && frames_lost_ > kPatience;
+}
 
 std::shared_ptr<const MapSnapshot> Tracker::Track(const Frame& frame) {
-  return impl_->Track(frame);
+  StopWatch total;
+  times_ = StageTimes();
+  const bool usable = frame.camera != nullptr && frame.grey.cols == source_.camera->width() &&
+                      frame.grey.rows == source_.camera->height();
+  const double dt = has_frame_ ? Seconds(frame.capture_time_ns - last_frame_.capture_time_ns) : 0.0;
+  const bool gap = has_frame_ && IsGap(last_frame_.capture_time_ns, frame.capture_time_ns);
+  if (!usable || (has_frame_ && dt <= 0.0 && !gap) || !pyramid_.Build(frame.grey).ok()) {
+    return Publish(frame, times_);
+  }
+  // One picture again is no measurement: what moves meanwhile is a gap when the next one comes.
+  if (has_frame_ && !gap && SamePicture(frame.grey, last_frame_.grey)) {
+    if (started_ && ++repeated_ > kRepeats) monitor_.Suspend();
+    return Publish(frame, times_);
+  }
+  repeated_ = 0;
+  if (has_frame_) rate_.Add(dt);
+  if (gap) ResumeAfterGap();
+  previous_mount_ = has_frame_ ? last_frame_.mount : std::nullopt;
+  last_frame_ = frame;
+  if (last_frame_.mount && !ToVector(*last_frame_.mount).allFinite()) last_frame_.mount.reset();
+  has_frame_ = true;
+  if (!started_) {
+    Begin(frame);
+  } else if (monitor_.status() == TrackingStatus::kLost && Hopeless()) {
+    StartAnew(frame);
+  } else if (monitor_.status() == TrackingStatus::kLost) {
+    refiner_.Drop(filter_);
+    loops_.Reset();
+    Recover(frame);
+  } else {
+    Follow(frame, dt);
+  }
+  frames_tracked_ += monitor_.status() == TrackingStatus::kTracking ? 1 : 0;
+  times_.total_ms = total.Lap_ms() - times_.waited_ms;
+  return Publish(frame, times_);
 }
 
-void Tracker::WaitForBackground() const { impl_->WaitForBackground(); }
-
-void Tracker::Reset() { impl_->Reset(); }
-
-absl::StatusOr<FeatureId> Tracker::SeedFeature(const Frame& clicked_frame,
-                                               const Rigid3& world_from_camera,
-                                               const Eigen::Vector2d& pixel, double depth_prior_m,
-                                               double depth_sigma_m) {
-  return impl_->SeedFeature(clicked_frame, world_from_camera, pixel, depth_prior_m, depth_sigma_m);
+void Tracker::Begin(const Frame& frame) {
+  StopWatch watch;
+  matches_ = FrameMatches();
+  const auto start = starter_.Try(frame, pyramid_, filter_, map_.in_use());
+  times_.search_ms = watch.Lap_ms();
+  if (!start) {
+    monitor_.WaitForStart();
+    return;
+  }
+  metric_ = start->metric;
+  held_ = metric_ || !options_.start;
+  depth_ = start->depth;
+  matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_.in_use(), MotionStep(), random_);
+  births_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/true, matcher_, filter_,
+               map_.in_use(), random_);
+  started_ = filter_.feature_count() > 0 || !map_.in_use().all().empty();
+  times_.manage_ms = watch.Lap_ms();
+  if (!started_) return;  // nothing to see at all: try again with the next frame
+  frames_ = 0;
+  // Features that are born in this frame are seen in it.
+  const int born = static_cast<int>(filter_.feature_count());
+  matches_.attempted += born;
+  matches_.accepted += born;
+  if (held_) {
+    KeepForAdjustment(*frame.camera);
+  } else {
+    finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
+  }
+  if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
 }
 
-const TrackerOptions& Tracker::options() const { return impl_->options(); }
+bool Tracker::Settled() const {
+  if (!held_) return false;
+  return options_.start || metric_ || monitor_.status() != TrackingStatus::kInitialising ||
+         HasSettled(matches_, filter_, frames_, SettlingOptions());
+}
+
+void Tracker::PredictAndSearch(const CameraModel& camera, double dt) {
+  StopWatch watch;
+  MotionNoise noise{options_.acceleration_sigma_m_s2, options_.angular_acceleration_sigma_rad_s2};
+  const MotionNoise agile = noise;
+  std::optional<HeadMotion> head;
+  if (options_.encoders && source_.mount && previous_mount_ && last_frame_.mount) {
+    head = EncoderMotion(*source_.mount, *previous_mount_, *last_frame_.mount, dt, metric_);
+    noise = {options_.worn_acceleration_sigma_m_s2,
+             options_.worn_angular_acceleration_sigma_rad_s2};
+  }
+  const CameraMotion before = filter_.camera();
+  const int accepted_before = matches_.accepted;
+  filter_.Predict(dt, noise, head ? &*head : nullptr);
+  suspended_ = suspension_.Suspends(head ? &*head : nullptr, dt);
+  if (!suspended_) Wake(camera);
+  times_.predict_ms = watch.Lap_ms();
+  if (suspended_) {
+    matches_ = FrameMatches();
+    return;
+  }
+  matches_ = matcher_.Match(pyramid_, camera, filter_, map_.in_use(), {dt, noise}, random_);
+  if (IsWorthWidening(matches_, accepted_before, options_.coasting_below)) {
+    WidenAfterSurprise(before, dt, agile, SurpriseOptions(), filter_);
+    const double searched_px2 = matches_.searched_px2;
+    matches_ = matcher_.Match(pyramid_, camera, filter_, map_.in_use(), {dt, noise}, random_);
+    matches_.searched_px2 += searched_px2;
+  }
+  times_.search_ms = watch.Lap_ms();
+}
+
+void Tracker::Correct(const CameraModel& camera) {
+  StopWatch watch;
+  if (matches_.accepted >= kFewestToUpdate) {
+    std::vector<Observation> observations;
+    for (const LandmarkMatch& match : matches_.in_view) {
+      if (!match.accepted()) continue;
+      Observation observation;
+      observation.id = match.id;
+      if (const auto* known = std::get_if<Eigen::Vector3d>(&match.point)) {
+        observation.known_point = *known;
+      }
+      observation.pixel = match.pixel - match.row_shift;
+      observation.d_readout = match.d_readout;
+      observation.noise = match.noise / match.weight;  // soft gate
+      observations.push_back(observation);
+    }
+    const auto report = filter_.Update(camera, observations, matches_.pose.world_from_camera);
+    if (!report.ok()) matches_.accepted = 0;
+  }
+  times_.update_ms = watch.Lap_ms();
+}
+
+void Tracker::Follow(const Frame& frame, double dt) {
+  ++frames_;
+  PredictAndSearch(*frame.camera, dt);
+  if (suspended_) {
+    monitor_.Suspend();
+    return;
+  }
+  Correct(*frame.camera);
+  StopWatch watch;
+  rate_.Record(matches_.attempted, matches_.accepted, MovedPx(*frame.camera, dt));
+  monitor_.Record(matches_.attempted, matches_.accepted, Settled());
+  const bool confirmed = monitor_.status() == TrackingStatus::kTracking ||
+                         monitor_.status() == TrackingStatus::kInitialising;
+  if (monitor_.refused()) {
+    Revert();
+  } else if (confirmed) {
+    before_relocalisation_.reset();
+    Manage(frame);
+  }
+  times_.manage_ms = watch.Lap_ms() - times_.waited_ms;
+}
+
+/// How far things moved in the picture since the one before, about; nothing: too little was found.
+std::optional<double> Tracker::MovedPx(const CameraModel& camera, double dt) const {
+  if (matches_.accepted < options_.coasting_below) return std::nullopt;
+  const double rate = matches_.motion.angular_velocity_rad_s.norm() +
+                      matches_.motion.velocity_m_s.norm() * depth_.inverse_range;
+  return dt * rate * camera.intrinsics().fx;
+}
+
+void Tracker::MoveHome() {
+  const auto wanted = WantedHome(matches_, filter_, home_, {.least_share = options_.home_share});
+  if (wanted && filter_.CountErrorsFrom(*wanted)) home_ = *wanted;
+}
+
+void Tracker::Manage(const Frame& frame) {
+  // A frame in which hardly anything was found says nothing about single features.
+  const bool telling = matches_.accepted >= 0.3 * matches_.attempted;
+  for (const LandmarkMatch& match : matches_.in_view) {
+    Landmark& landmark = *map_.in_use().Find(match.id);
+    landmark.last_in_view_frame = frames_;
+    if (!match.searched || (!telling && !match.accepted())) continue;
+    landmark.Record(match.accepted(), frames_);
+  }
+  if (starter_.TargetExpired(frames_) && matches_.accepted > 0) {
+    LetTargetGo(frame, matcher_, births_, matches_, map_, filter_);
+  }
+  retirement_.Apply(Now(), map_, filter_);
+  // With most of the view covered the little that is left is no place to start features from: it
+  // would be lost when the cover goes (T46).
+  const bool covered = matches_.hidden > matches_.attempted;
+  if (!held_) {
+    if (telling && !covered) {
+      births_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_,
+                   map_.in_use(), random_);
+    }
+    SeekStart(frame);
+    return;
+  }
+  MoveHome();
+  if (refiner_.Finish(frames_, frame.capture_time_ns, depth_.inverse_range, map_, filter_)) {
+    ++revision_;
+  }
+  times_.waited_ms = refiner_.waited_ms();
+  if (!telling || covered) return;
+  if (const auto guess = Births::GuessDepth(filter_, matches_)) depth_ = *guess;
+  births_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_,
+               map_.in_use(), random_);
+  if (KeepForAdjustment(*frame.camera)) {
+    refiner_.Start(frames_, frame.capture_time_ns, map_, filter_);
+  }
+  KeepKeyframe(frame);
+  CloseLoops(frame);
+}
 
 }  // namespace saccade

@@ -4,9 +4,23 @@
 
 #include <Eigen/Dense>
 #include <memory>
+#include <random>
 
 #include "server/capture/frame_source.hpp"
+#include "server/map/map.hpp"
+#include "server/map/relocaliser.hpp"
+#include "server/tracker/advice.hpp"
+#include "server/tracker/births.hpp"
+#include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/frame_tracker.hpp"
+#include "server/tracker/loop_closer.hpp"
+#include "server/tracker/picture_rate.hpp"
+#include "server/tracker/refiner.hpp"
+#include "server/tracker/retirement.hpp"
+#include "server/tracker/start_finder.hpp"
+#include "server/tracker/starter.hpp"
+#include "server/tracker/status_monitor.hpp"
+#include "server/tracker/suspension.hpp"
 #include "server/tracker/tracker_options.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
@@ -22,7 +36,6 @@ class Tracker final : public FrameTracker {
   /// InvalidArgument: options out of range, no camera, a target that cannot be used.
   static absl::StatusOr<std::unique_ptr<Tracker>> Create(const SourceInfo& source,
                                                          const TrackerOptions& options);
-  ~Tracker() override;
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
 
@@ -33,7 +46,11 @@ class Tracker final : public FrameTracker {
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override;
 
   /// Returns when nothing is being computed on other threads (for a process that forks).
-  void WaitForBackground() const;
+  void WaitForBackground() const {
+    refiner_.Wait();
+    finder_.Wait();
+    loops_.Wait();
+  }
 
   /// Throws the map away; the next frame starts anew (with the target, where there is one in view).
   void Reset() override;
@@ -50,12 +67,85 @@ class Tracker final : public FrameTracker {
                                         const Eigen::Vector2d& pixel, double depth_prior_m,
                                         double depth_sigma_m) override;
 
-  const TrackerOptions& options() const;
+  const TrackerOptions& options() const { return options_; }
 
  private:
-  class Impl;
-  explicit Tracker(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  Tracker(const SourceInfo& source, const TrackerOptions& options);
+  void Begin(const Frame& frame);
+  /// Lost before there was a map that one could come back to.
+  void StartAnew(const Frame& frame);
+  /// Lost, and the map was seen too shortly to be found again: another one is worth more.
+  bool Hopeless() const;
+  void Follow(const Frame& frame, double dt);
+  void Recover(const Frame& frame);
+  /// Before the first frame after a gap in time (server/capture/gap.hpp): a map that can be
+  /// recognised is looked for in that frame, and confirmed as after any loss; another starts anew.
+  void ResumeAfterGap();
+  bool Accept(const Relocalisation& found, const CameraModel& camera);
+  void Revert();
+  /// Predicts and searches; widens what is expected if the camera moved unexpectedly.
+  void PredictAndSearch(const CameraModel& camera, double dt);
+  void Correct(const CameraModel& camera);
+  void Manage(const Frame& frame);
+  /// Errors are counted from where the camera is, not from where it once began (WantedHome).
+  void MoveHome();
+  MapMoment Now() const { return {frames_, home_, depth_.inverse_range}; }
+  /// Takes landmarks at rest back that should be in view, where the filter has too few.
+  void Wake(const CameraModel& camera);
+  /// Of where a keyframe was, when its landmarks are woken.
+  Matrix6d WakeCovariance(double distance_m) const;
+  /// Keeps this frame as a keyframe of the map, if it has news; true if it had.
+  bool KeepForAdjustment(const CameraModel& camera);
+  void PublishAtRest(MapSnapshot& snapshot) const;
+  OldLandmarks OldOnes() const;
+  void CloseLoops(const Frame& frame);
+  void MoveMap(const MapCorrection& correction);
+  void KeepKeyframe(const Frame& frame);
+  bool Settled() const;
+  /// Without a target, until the pictures hold the scale: tries to find a start, and takes it over.
+  void SeekStart(const Frame& frame);
+  /// Filter, map and keyframes anew, from a start that holds; the camera from this frame's matches.
+  void TakeOver(const FoundStart& start, const Frame& frame);
+  std::optional<double> MovedPx(const CameraModel& camera, double dt) const;
+  Difficulties SeeDifficulties() const;
+  std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times);
+
+  SourceInfo source_;
+  TrackerOptions options_;
+  std::mt19937_64 random_;
+  FilterState filter_;
+  Map map_;
+  FrameMatcher matcher_;
+  Births births_;
+  const Retirement retirement_;
+  Starter starter_;
+  StatusMonitor monitor_;
+  PictureRate rate_;  // the source's: a new map changes nothing about it
+  Relocaliser relocaliser_;
+  Refiner refiner_;
+  StartFinder finder_;
+  LoopCloser loops_;  // reads relocaliser_
+  ImagePyramid pyramid_;
+
+  Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows
+  std::optional<MountAngles> previous_mount_;  // of the frame before it
+  bool has_frame_ = false;
+  int repeated_ = 0;  // times that the newest picture came again
+  bool started_ = false;
+  bool metric_ = false;
+  bool held_ = false;  // the map's scale is: by a target, or by what was seen from different places
+  Suspension suspension_;
+  bool suspended_ = false;  // the head turns too fast for this frame to be searched
+  Births::DepthGuess depth_;
+  std::int64_t frames_ = 0;  // since the start of this map
+  std::int64_t frames_lost_ = 0;
+  std::int64_t frames_tracked_ = 0;  // of this map
+  std::uint64_t revision_ = 0;
+  AnchorPoseId home_ = 1;  // clone that errors are counted from; at first where the map began
+  std::uint64_t generation_ = 0;
+  FrameMatches matches_;
+  StageTimes times_;
+  std::optional<Map::Checkpoint> before_relocalisation_;
 };
 
 }  // namespace saccade

@@ -1,9 +1,10 @@
-#include "server/tracker/map_keeper.hpp"
+#include "server/tracker/births.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "server/filter/new_clone.hpp"
+#include "server/tracker/depth_knowledge.hpp"
 #include "server/tracker/line_time.hpp"
 
 namespace saccade {
@@ -19,17 +20,16 @@ CornerOptions MakeCornerOptions(const TrackerOptions& options) {
 constexpr int kDepthFeatures = 8;          // needed to guess the depth of a new one
 constexpr int kFramesBetweenGrowth = 5;    // unless the view is nearly empty
 constexpr double kBetweenGrowth_s = 0.16;  // where frames take longer
-constexpr std::uint32_t kProbation = 8;    // attempts that a woken landmark has
 
 }  // namespace
 
-MapKeeper::MapKeeper(const TrackerOptions& options)
+Births::Births(const TrackerOptions& options)
     : options_(options), detector_(MakeCornerOptions(options)) {}
 
-void MapKeeper::Reset() { frames_since_growth_ = 1000; }
+void Births::Reset() { frames_since_growth_ = 1000; }
 
-std::optional<MapKeeper::DepthGuess> MapKeeper::GuessDepth(const FilterState& filter,
-                                                           const FrameMatches& matches) {
+std::optional<Births::DepthGuess> Births::GuessDepth(const FilterState& filter,
+                                                     const FrameMatches& matches) {
   std::vector<double> inverse;
   const Rigid3 camera_from_world = filter.camera().world_from_camera.Inverse();
   for (const LandmarkMatch& match : matches.in_view) {
@@ -38,7 +38,7 @@ std::optional<MapKeeper::DepthGuess> MapKeeper::GuessDepth(const FilterState& fi
       range = (camera_from_world * std::get<Eigen::Vector3d>(match.point)).norm();
     } else if (filter.Has(match.id)) {
       const FeatureMarginal marginal = filter.Marginal(match.id);
-      if (marginal.inverse_range_sigma > 0.3 * marginal.inverse_range) continue;
+      if (!KnownTo(marginal, DepthKnowledge::kToGuessOthers)) continue;
       range = (camera_from_world * marginal.point_in_world).norm();
     }
     if (range > 0.0) inverse.push_back(1.0 / range);
@@ -52,54 +52,7 @@ std::optional<MapKeeper::DepthGuess> MapKeeper::GuessDepth(const FilterState& fi
   return DepthGuess{median, 0.5 * median};
 }
 
-void MapKeeper::Forget(std::int64_t frame, FilterState& filter, LandmarkMap& map,
-                       const Judge& may_rest, const Judge& left_behind) const {
-  if (options_.forget_after <= 0) return;
-  std::vector<FeatureId> gone;
-  for (const Landmark& landmark : map.all()) {
-    if (landmark.known || landmark.seeded ||
-        landmark.last_in_view_frame >= frame - options_.forget_after) {
-      continue;
-    }
-    if (left_behind(landmark) && !may_rest(landmark)) gone.push_back(landmark.id);
-  }
-  filter.Remove(gone);
-  map.Remove(gone);
-}
-
-void MapKeeper::Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest,
-                       const Judge& may_rest, const Judge& left_behind) {
-  std::vector<FeatureId> gone = filter.RemoveBehind();
-  std::vector<FeatureId> resting;
-  const std::vector<FeatureId> unreliable = Unreliable(map, RetirementOptions());
-  for (const FeatureId id : unreliable) {
-    (map.Find(id)->woken ? resting : gone).push_back(id);
-  }
-  filter.Remove(gone);
-  map.Remove(gone);
-  for (const Landmark& landmark : map.all()) {
-    if (landmark.known) continue;
-    const bool out_of_sight =
-        options_.rest_after > 0 && landmark.last_in_view_frame < frame - options_.rest_after;
-    if (FailsProbation(landmark) || (out_of_sight && left_behind(landmark) && may_rest(landmark))) {
-      resting.push_back(landmark.id);
-    }
-  }
-  std::sort(resting.begin(), resting.end());
-  resting.erase(std::unique(resting.begin(), resting.end()), resting.end());
-  if (!resting.empty()) rest(resting);
-  Forget(frame, filter, map, may_rest, left_behind);
-  const int excess = static_cast<int>(filter.feature_count()) - options_.max_features;
-  if (excess > 0) rest(LeastWorth(map, excess, frame));
-}
-
-bool MapKeeper::FailsProbation(const Landmark& landmark) {
-  return landmark.woken && landmark.woken->attempted >= kProbation &&
-         landmark.woken->attempted < 4 * kProbation &&
-         4 * landmark.woken->matched < landmark.woken->attempted;
-}
-
-int MapKeeper::Missing(const FrameMatches& matches) const {
+int Births::Missing(const FrameMatches& matches) const {
   int usable = 0;
   for (const LandmarkMatch& match : matches.in_view) {
     usable += match.searched || match.weight > 0 ? 1 : 0;
@@ -107,7 +60,7 @@ int MapKeeper::Missing(const FrameMatches& matches) const {
   return options_.features_in_view - usable;
 }
 
-bool MapKeeper::Wants(const FrameMatches& matches) const {
+bool Births::Wants(const FrameMatches& matches) const {
   const int missing = Missing(matches);
   if (missing <= 0) return false;
   if (missing > options_.features_in_view / 2) return true;
@@ -116,8 +69,8 @@ bool MapKeeper::Wants(const FrameMatches& matches) const {
   return missing >= options_.features_in_view / 8 && due;
 }
 
-std::optional<Eigen::Vector2d> MapKeeper::CornerNear(const ImagePyramid& pyramid,
-                                                     const Eigen::Vector2d& pixel, int radius_px) {
+std::optional<Eigen::Vector2d> Births::CornerNear(const ImagePyramid& pyramid,
+                                                  const Eigen::Vector2d& pixel, int radius_px) {
   const cv::Rect region(static_cast<int>(std::lround(pixel.x())) - radius_px,
                         static_cast<int>(std::lround(pixel.y())) - radius_px, 2 * radius_px + 1,
                         2 * radius_px + 1);
@@ -126,10 +79,10 @@ std::optional<Eigen::Vector2d> MapKeeper::CornerNear(const ImagePyramid& pyramid
   return corners_.front().pixel;
 }
 
-std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
-                                          const DepthGuess& depth, AnchorPoseId anchor,
-                                          const CameraMotion& motion, const FrameMatcher& matcher,
-                                          FilterState& filter, LandmarkMap& map) {
+std::optional<FeatureId> Births::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
+                                       const DepthGuess& depth, AnchorPoseId anchor,
+                                       const CameraMotion& motion, const FrameMatcher& matcher,
+                                       FilterState& filter, LandmarkMap& map) {
   auto patch = CutPatch(frame.grey, pixel, frame.camera);
   Eigen::Matrix<double, 3, 2> d_bearing;
   const auto bearing = frame.camera->Unproject(pixel, &d_bearing);
@@ -157,9 +110,9 @@ std::optional<FeatureId> MapKeeper::Plant(const Frame& frame, const Eigen::Vecto
   return birth.id;
 }
 
-int MapKeeper::Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
-                    const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
-                    FilterState& filter, LandmarkMap& map, std::mt19937_64& random) {
+int Births::Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
+                 const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
+                 FilterState& filter, LandmarkMap& map, std::mt19937_64& random) {
   ++frames_since_growth_;
   now_ns_ = frame.capture_time_ns;
   if (!everywhere && !Wants(matches)) return 0;

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <random>
-#include <span>
 #include <vector>
 
 #include "server/capture/frame.hpp"
@@ -15,10 +13,10 @@
 
 namespace saccade {
 
-/// Starts features where they are needed and retires those that are no good (slam-spec 5.6).
-class MapKeeper {
+/// Starts features where they are needed (slam-spec 5.6, docs/derivations/birth.md).
+class Births {
  public:
-  explicit MapKeeper(const TrackerOptions& options);
+  explicit Births(const TrackerOptions& options);
   void Reset();
 
   /// What features near the camera are taken to be at, before anything is known of them.
@@ -30,17 +28,6 @@ class MapKeeper {
   static std::optional<DepthGuess> GuessDepth(const FilterState& filter,
                                               const FrameMatches& matches);
 
-  /// Takes features out of filter and map that may be of use later.
-  using Rest = std::function<void(std::span<const FeatureId>)>;
-  using Judge = std::function<bool(const Landmark&)>;
-  /// Removes what is unreliable or impossible. What is out of sight and `left_behind` (the camera
-  /// is elsewhere than where it saw it first) goes to `rest` if it `may_rest` (it would be of use
-  /// later), and is forgotten if not; to `rest` go, too, what was woken in vain and, in a full map,
-  /// what is worth least.
-  void Retire(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Rest& rest,
-              const Judge& may_rest, const Judge& left_behind);
-  /// A woken landmark that is hardly ever found where it was thought to be.
-  static bool FailsProbation(const Landmark& landmark);
   /// How many more features the map wants in view.
   int Missing(const FrameMatches& matches) const;
   /// Starts features in a new pose clone, where the picture has corners and the map has none.
@@ -61,9 +48,6 @@ class MapKeeper {
   bool Wants(const FrameMatches& matches) const;
 
  private:
-  void Forget(std::int64_t frame, FilterState& filter, LandmarkMap& map, const Judge& may_rest,
-              const Judge& left_behind) const;
-
   TrackerOptions options_;
   CornerDetector detector_;
   std::vector<Corner> corners_;
