@@ -25,7 +25,7 @@ absl::StatusOr<AnnotationPatch> PatchFromProto(const v1::UpdateAnnotationRequest
   if (absl::Status id = wire::CheckUuid(request.id(), "id"); !id.ok()) return id;
   patch.id = request.id();
   if (request.has_text()) {
-    absl::Status text = wire::CheckText(request.text(), wire::kMaxTextBytes, "text");
+    absl::Status text = wire::CheckText(request.text(), kMaxTextBytes, "text");
     if (!text.ok()) return text;
     patch.text = request.text();
   }
