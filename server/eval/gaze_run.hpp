@@ -15,7 +15,7 @@
 #include "server/eval/statistics.hpp"
 #include "server/eval/tracker_session.hpp"
 #include "server/gaze/gaze_loop.hpp"
-#include "server/mount/sim_mount.hpp"
+#include "server/mount/drivers/sim_mount.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {
