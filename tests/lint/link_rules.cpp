@@ -118,9 +118,11 @@ std::vector<std::string> MissingLinks(const fs::path& root,
         if (needed.contains(name) || linked(target, needed)) continue;
         if (owner != owners.end() && linked(target, homes[folder])) continue;
         if (!told.insert(folder).second) continue;
-        problems.push_back(file + " includes " + include + ", but " + target.folder +
-                           "/CMakeLists.txt links " + name + " to no target of " + folder +
-                           ": add " + (needed.empty() ? "it" : *needed.begin()));
+        std::ostringstream words;
+        words << file << " includes " << include << ", but " << target.folder
+              << "/CMakeLists.txt links " << name << " to no target of " << folder << ": add "
+              << (needed.empty() ? "it" : *needed.begin());
+        problems.push_back(words.str());
       }
     }
   }
