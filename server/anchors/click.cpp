@@ -10,11 +10,11 @@
 
 #include "server/anchors/local_surface.hpp"
 #include "server/anchors/rigid_fit.hpp"
+#include "shared/scene/limits.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kMaxCoordinateM = 1e5;         // of points and rays that callers give
 constexpr double kRayRadiansPerPx = 1.0 / 500;  // a ray has no camera: an ordinary one is assumed
 constexpr double kPointSigmaM = 0.001;  // a point given in world is exact; what is drawn is not
 constexpr double kFailedTrust = 0.3;    // searched for and not found: perhaps hidden
@@ -185,9 +185,9 @@ absl::StatusOr<ResolvedTarget> ResolveFeature(const FeatureTarget& target, const
 
 absl::StatusOr<ResolvedTarget> ResolvePoint(const PointTarget& target) {
   const Eigen::Vector3d& point = target.point_in_world;
-  if (!point.allFinite() || point.norm() > kMaxCoordinateM) {
+  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > kMaxCoordinateM) {
     return absl::InvalidArgumentError(
-        "target.point_in_world_m is not finite or more than 100 km away; give metres in world");
+        "target.point_in_world_m is not finite or more than 10 km away; give metres in world");
   }
   ResolvedTarget resolved;
   resolved.method = AnchorMethod::kPoint;
@@ -200,7 +200,7 @@ absl::StatusOr<ResolvedTarget> ResolveRay(const RayTarget& target, const MapView
                                           const AnchorOptions& options) {
   const double length = target.direction_in_world.norm();
   if (!target.origin_in_world.allFinite() || !(length > 1e-9) || !(length < 1e9) ||
-      target.origin_in_world.norm() > kMaxCoordinateM) {
+      target.origin_in_world.cwiseAbs().maxCoeff() > kMaxCoordinateM) {
     return absl::InvalidArgumentError(
         "target.ray is not finite or has no direction; give an origin in metres and a direction "
         "with a length above 0");

@@ -8,12 +8,10 @@
 #include <random>
 #include <variant>
 
+#include "shared/scene/limits.hpp"
+
 namespace saccade {
 namespace {
-
-constexpr std::size_t kMaxTextBytes = 500;
-constexpr double kMaxSizeM = 10.0;
-constexpr std::size_t kMaxInkPoints = 2000;
 
 absl::Status CheckText(const std::string& text) {
   if (text.size() <= kMaxTextBytes) return absl::OkStatus();

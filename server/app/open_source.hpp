@@ -3,19 +3,17 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
-#include <optional>
 
 #include "server/app/server_config.hpp"
 #include "server/capture/frame_source.hpp"
-#include "server/mount/mount.hpp"
+#include "server/mount/mount_registry.hpp"
 
 namespace saccade {
 
 /// Where frames come from, and what turns the camera.
 struct OpenedSource {
   std::unique_ptr<FrameSource> source;
-  std::shared_ptr<Mount> mount;          // null: none
-  std::optional<CameraIntrinsics> crop;  // digital gaze: what the mount turns
+  OpenedMount mount;
 };
 
 /// The source and the mount that the configuration names, of every scheme this program links.

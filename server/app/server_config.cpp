@@ -1,18 +1,28 @@
 #include "server/app/server_config.hpp"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_split.h>
+#include <absl/strings/str_format.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
 #include <set>
+#include <type_traits>
+#include <variant>
+#include <vector>
 
+#include "server/encode/video_encoder.hpp"
+#include "server/gaze/gaze_options.hpp"
+#include "server/mount/drivers/drivers.hpp"
+#include "server/tracker/tracker_options.hpp"
 #include "shared/io/toml_file.hpp"
 
 namespace saccade {
 namespace {
+
+constexpr std::int64_t kMostRunFor_s = 1'000'000'000;  // 31 years
+constexpr double kMostLimitsScale = 1000;
 
 // What the flags and the file give as text, before it means anything.
 struct Raw {
@@ -26,25 +36,89 @@ struct Raw {
   std::int64_t seed = 1;
 };
 
-void AddFlags(CLI::App& app, Raw& raw) {
-  app.set_version_flag("--version", std::string("saccade-server ") + kVersion);
-  app.add_option("--source", raw.source, "sim:desk[?...] | dataset:DIR");
-  app.add_option(
-      "--mount", raw.mount,
-      "none | sim[?crooked=SEED] | dynamixel:DEVICE[?baud=N] | v4l2:DEVICE | crop:[WxH]");
-  app.add_option("--config", raw.config, "TOML file; flags win over it");
-  app.add_option("--data-dir", raw.data_dir, "annotations are kept here");
-  app.add_option("--camera", raw.camera, "camera.yaml instead of the source's own");
-  app.add_option("--grpc", raw.grpc, "HOST:PORT, port 0: any (127.0.0.1:50051)");
-  app.add_option("--http", raw.http, "HOST:PORT, port 0: any (127.0.0.1:8080)");
-  app.add_flag("--insecure", raw.insecure, "serve beyond this machine without TLS or roles");
-  app.add_option("--gl", raw.gl, "osmesa | egl");
-  app.add_option("--speed", raw.speed, "realtime | max (every frame, as fast as it can)");
-  app.add_option("--run-for", raw.run_for_s, "end after so many seconds");
-  app.add_option("--sim-truth", raw.sim_truth, "JSON lines of the simulator's truth");
+/// One thing that can be said, once for the flag, the file, --help and --print-config.
+struct Setting {
+  const char* key;   // in the file; null: a flag only
+  const char* flag;  // null: in the file only
+  std::variant<std::string Raw::*, bool Raw::*, double Raw::*, std::int64_t Raw::*> field;
+  std::string help;
+};
+
+const std::vector<Setting>& Settings() {
+  static const std::vector<Setting> settings = {
+      {"source", "--source", &Raw::source, "sim:desk[?...] | dataset:DIR"},
+      {"mount", "--mount", &Raw::mount, MountDrivers().Usage()},
+      {nullptr, "--config", &Raw::config, "TOML file; flags win over it"},
+      {"data_dir", "--data-dir", &Raw::data_dir, "annotations are kept here"},
+      {"camera", "--camera", &Raw::camera, "camera.yaml instead of the source's own"},
+      {"grpc", "--grpc", &Raw::grpc, "HOST:PORT, port 0: any (127.0.0.1:50051)"},
+      {"http", "--http", &Raw::http, "HOST:PORT, port 0: any (127.0.0.1:8080)"},
+      {"insecure", "--insecure", &Raw::insecure, "serve beyond this machine without TLS or roles"},
+      {"gl", "--gl", &Raw::gl, "osmesa | egl"},
+      {"speed", "--speed", &Raw::speed, "realtime | max (every frame, as fast as it can)"},
+      {nullptr, "--run-for", &Raw::run_for_s, "end after so many seconds"},
+      {nullptr, "--sim-truth", &Raw::sim_truth, "JSON lines of the simulator's truth"},
+      {"web_root", nullptr, &Raw::web_root, "the page's files; empty: where they were built"},
+      {"seed", nullptr, &Raw::seed, "of the tracker and of a simulated mount"},
+  };
+  return settings;
 }
 
-constexpr std::int64_t kMostRunFor_s = 1'000'000'000;  // 31 years
+void AddFlags(CLI::App& app, Raw& raw) {
+  app.set_version_flag("--version", std::string("saccade-server ") + kVersion);
+  for (const Setting& setting : Settings()) {
+    if (setting.flag == nullptr) continue;
+    std::visit(
+        [&](auto field) {
+          if constexpr (std::is_same_v<decltype(field), bool Raw::*>) {
+            app.add_flag(setting.flag, raw.*field, setting.help);
+          } else {
+            app.add_option(setting.flag, raw.*field, setting.help);
+          }
+        },
+        setting.field);
+  }
+  app.add_flag_callback(
+      "--print-config", [] { throw CLI::CallForAllHelp(); },
+      "print a file with every key, its default, range and meaning");
+}
+
+std::string BitRateWords() {
+  return absl::StrCat(kLeastBitRate_bit_s, " to ", kMostBitRate_bit_s,
+                      ", or 0: by the size of the picture");
+}
+std::string LimitsScaleWords() { return absl::StrCat("0 (no limits) to ", kMostLimitsScale); }
+
+/// A file that says everything and changes nothing.
+std::string DefaultFile() {
+  std::string text;
+  const Raw defaults;
+  const auto add = [&text](const std::string& line, const std::string& help) {
+    absl::StrAppend(&text, absl::StrFormat("%-44s # %s\n", line, help));
+  };
+  for (const Setting& setting : Settings()) {
+    if (setting.key == nullptr) continue;
+    const std::string value = std::visit(
+        [&](auto field) -> std::string {
+          if constexpr (std::is_same_v<decltype(field), std::string Raw::*>) {
+            return absl::StrCat("\"", defaults.*field, "\"");
+          } else if constexpr (std::is_same_v<decltype(field), bool Raw::*>) {
+            return defaults.*field ? "true" : "false";
+          } else {
+            return absl::StrCat(defaults.*field);
+          }
+        },
+        setting.field);
+    add(absl::StrCat(setting.key, " = ", value), setting.help);
+  }
+  absl::StrAppend(&text, "\n[video]\n");
+  add("bit_rate_bit_s = 0", BitRateWords());
+  absl::StrAppend(&text, "\n[limits]\n");
+  add("scale = 1.0", LimitsScaleWords() + ", of what one caller may ask for");
+  absl::StrAppend(&text, "\n", TrackerOptions::Describe(), "\n", GazeOptions::Describe(), "\n",
+                  MountDrivers().Describe());
+  return text;
+}
 
 absl::Status Bad(const std::string& what) { return absl::InvalidArgumentError(what); }
 
@@ -66,17 +140,12 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
     std::set<std::string> left;
     for (const auto& [key, value] : root.as_table()) left.insert(key);
     const auto given = [&app](const char* flag) { return app.count(flag) > 0; };
-    Take(root, "source", given("--source"), raw.source, left);
-    Take(root, "mount", given("--mount"), raw.mount, left);
-    Take(root, "data_dir", given("--data-dir"), raw.data_dir, left);
-    Take(root, "camera", given("--camera"), raw.camera, left);
-    Take(root, "grpc", given("--grpc"), raw.grpc, left);
-    Take(root, "http", given("--http"), raw.http, left);
-    Take(root, "insecure", given("--insecure"), raw.insecure, left);
-    Take(root, "gl", given("--gl"), raw.gl, left);
-    Take(root, "speed", given("--speed"), raw.speed, left);
-    Take(root, "web_root", false, raw.web_root, left);
-    Take(root, "seed", false, raw.seed, left);
+    for (const Setting& setting : Settings()) {
+      if (setting.key == nullptr) continue;
+      const bool flag_wins = setting.flag != nullptr && given(setting.flag);
+      std::visit([&](auto field) { Take(root, setting.key, flag_wins, raw.*field, left); },
+                 setting.field);
+    }
     if (root.contains("video")) {
       const toml::value& video = toml::find(root, "video");
       std::set<std::string> keys;
@@ -101,9 +170,8 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
       left.erase("limits");
     }
     // Read by TrackerOptions, GazeOptions and the mounts.
-    for (const char* table : {"tracker", "gaze", "mount_model", "dynamixel", "v4l2"}) {
-      left.erase(table);
-    }
+    for (const char* table : {"tracker", "gaze"}) left.erase(table);
+    for (const std::string& table : MountDrivers().Tables()) left.erase(table);
     if (!left.empty()) return Bad(absl::StrCat(raw.config, ": unknown key ", *left.begin()));
   } catch (const std::exception& error) {
     return Bad(absl::StrCat("--config: ", raw.config, ": ", error.what()));
@@ -134,35 +202,12 @@ absl::Status CheckAddresses(const Raw& raw, ServerConfig& config) {
   return absl::OkStatus();
 }
 
-absl::Status CheckMount(const Raw& raw) {
-  const auto [scheme, rest] =
-      std::pair<std::string, std::string>(absl::StrSplit(raw.mount, absl::MaxSplits(':', 1)));
-  const bool sim = raw.mount == "sim" || raw.mount.rfind("sim?", 0) == 0;
-  const bool has_rest = raw.mount.find(':') != std::string::npos;
-  if (raw.mount == "none" || (scheme == "crop" && has_rest)) return absl::OkStatus();
-  if (!sim && (!has_rest || (scheme != "dynamixel" && scheme != "v4l2"))) {
-    return Bad(absl::StrCat("--mount: '", raw.mount,
-                            "' is not known: use none, sim, dynamixel:/dev/ttyUSB0, "
-                            "v4l2:/dev/video0 or crop:"));
-  }
-  if (sim && raw.source.rfind("sim:", 0) != 0) {
-    return Bad("--mount: sim turns the camera of a sim: source only");
-  }
-  if (!sim && rest.empty()) {
-    return Bad(absl::StrCat("--mount: ", scheme, ": names no device: write for example ",
-                            scheme == "v4l2" ? "v4l2:/dev/video0" : "dynamixel:/dev/ttyUSB0"));
-  }
-  if (raw.speed == "max") {
-    return Bad("--mount: a head moves by the clock: leave --speed max out");
-  }
-  return absl::OkStatus();
-}
-
 absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   ServerConfig config;
   if (raw.source.empty()) return Bad("--source is missing, e.g. --source sim:desk");
   config.source = raw.source;
-  if (absl::Status mount = CheckMount(raw); !mount.ok()) return mount;
+  const MountFacts facts{raw.source, raw.speed == "max"};
+  if (absl::Status mount = MountDrivers().Check(raw.mount, facts); !mount.ok()) return mount;
   config.mount = raw.mount;
   config.data_dir = raw.data_dir.empty() ? DefaultDataDir() : std::filesystem::path(raw.data_dir);
   config.camera_file = raw.camera;
@@ -180,14 +225,13 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
     return Bad("--sim-truth: only a sim: source knows the truth");
   }
   config.sim_truth = raw.sim_truth;
-  // As VideoEncoderOptions has it: less is no picture.
-  if (raw.bit_rate != 0 && (raw.bit_rate < 50'000 || raw.bit_rate > 100'000'000)) {
-    return Bad(absl::StrCat("video.bit_rate_bit_s: ", raw.bit_rate,
-                            ": give 50000 to 100000000, or 0: by the size of the picture"));
+  if (raw.bit_rate != 0 &&
+      (raw.bit_rate < kLeastBitRate_bit_s || raw.bit_rate > kMostBitRate_bit_s)) {
+    return Bad(absl::StrCat("video.bit_rate_bit_s: ", raw.bit_rate, ": give ", BitRateWords()));
   }
   config.video_bit_rate_bit_s = static_cast<int>(raw.bit_rate);
-  if (!(raw.limits_scale >= 0 && raw.limits_scale <= 1000)) {
-    return Bad(absl::StrCat("limits.scale: ", raw.limits_scale, ": 0 (no limits) to 1000"));
+  if (!(raw.limits_scale >= 0 && raw.limits_scale <= kMostLimitsScale)) {
+    return Bad(absl::StrCat("limits.scale: ", raw.limits_scale, ": ", LimitsScaleWords()));
   }
   config.limits_scale = raw.limits_scale;
   config.web_root = raw.web_root;
@@ -205,6 +249,9 @@ absl::StatusOr<std::optional<ServerConfig>> ServerConfig::FromCommandLine(int ar
   AddFlags(app, raw);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::CallForAllHelp&) {  // --print-config
+    std::cout << DefaultFile();
+    return std::nullopt;
   } catch (const CLI::Success& done) {  // --help, --version
     app.exit(done, std::cout, std::cerr);
     return std::nullopt;

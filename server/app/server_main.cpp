@@ -39,7 +39,7 @@ std::filesystem::path WebRoot(const ServerConfig& config) {
 /// nobody would know before they look.
 absl::Status CheckVideo(const ServerConfig& config, const OpenedSource& opened) {
   const CameraIntrinsics& camera = opened.source->info().camera->intrinsics();
-  for (const CameraIntrinsics& view : {camera, opened.crop.value_or(camera)}) {
+  for (const CameraIntrinsics& view : {camera, opened.mount.crop.value_or(camera)}) {
     const auto encoder = VideoEncoder::Create(
         VideoOptions(view.width, view.height, camera.fps, config.video_bit_rate_bit_s));
     if (encoder.ok()) continue;
@@ -58,10 +58,11 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
   if (!opened.ok()) return opened.status();
   if (absl::Status video = CheckVideo(config, *opened); !video.ok()) return video;
   SourceInfo info = opened->source->info();
-  if (opened->mount && !opened->crop)
-    info.mount = std::make_shared<const MountModel>(opened->mount->model());
+  if (opened->mount.mount && !opened->mount.crop)
+    info.mount = std::make_shared<const MountModel>(opened->mount.mount->model());
   EngineOptions options;
-  if (opened->crop) {  // nothing to wear out, and no blur: quick, unless the file says otherwise
+  if (opened->mount
+          .crop) {  // nothing to wear out, and no blur: quick, unless the file says otherwise
     options.gaze.rate_deg_s = 120.0;
     options.gaze.acceleration_deg_s2 = 2000.0;
   }
@@ -79,8 +80,8 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);
   if (!store.ok()) return store.status();
   options.version = kVersion;
-  options.mount = opened->mount;
-  options.crop = opened->crop;
+  options.mount = opened->mount.mount;
+  options.crop = opened->mount.crop;
   options.every_frame = config.every_frame;
   options.video_bit_rate_bit_s = config.video_bit_rate_bit_s;
   return Engine::Create(std::move(options), std::move(opened->source), *std::move(tracker),

@@ -91,9 +91,11 @@ absl::Status VideoEncoderOptions::Validate() const {
   if (!(fps_hz >= 1.0 && fps_hz <= 240.0)) {
     return absl::InvalidArgumentError(absl::StrCat("encoder: fps_hz ", fps_hz, ": 1 to 240"));
   }
-  if (bit_rate_bit_s != 0 && (bit_rate_bit_s < 50'000 || bit_rate_bit_s > 100'000'000)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("encoder: bit_rate_bit_s ", bit_rate_bit_s, ": 50000 to 100000000"));
+  if (bit_rate_bit_s != 0 &&
+      (bit_rate_bit_s < kLeastBitRate_bit_s || bit_rate_bit_s > kMostBitRate_bit_s)) {
+    return absl::InvalidArgumentError(absl::StrCat("encoder: bit_rate_bit_s ", bit_rate_bit_s, ": ",
+                                                   kLeastBitRate_bit_s, " to ",
+                                                   kMostBitRate_bit_s));
   }
   return absl::OkStatus();
 }

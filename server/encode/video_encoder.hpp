@@ -10,6 +10,9 @@
 
 namespace saccade {
 
+// Less is no picture, more is a mistake.
+inline constexpr int kLeastBitRate_bit_s = 50'000, kMostBitRate_bit_s = 100'000'000;
+
 struct VideoEncoderOptions {
   int width = 0;         // of the pictures [px], 16 to 4096; an odd last column is not coded
   int height = 0;        // likewise

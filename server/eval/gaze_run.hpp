@@ -14,7 +14,7 @@
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/statistics.hpp"
 #include "server/gaze/gaze_loop.hpp"
-#include "server/mount/sim_mount.hpp"
+#include "server/mount/drivers/sim_mount.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {

@@ -295,7 +295,6 @@ class FilterState {
 
   FilterOptions options_;
   CameraMotion camera_;
-  Eigen::Quaterniond first_rotation_ = Eigen::Quaterniond::Identity();  // of this frame
   Rigid3 first_pose_;
   std::vector<Anchor> anchors_;    // rising ids
   std::vector<Feature> features_;  // rising ids

@@ -13,7 +13,6 @@ void FilterState::MoveWorld(const Similarity3& world_from_before) {
   camera_.world_from_camera = world_from_before.Move(camera_.world_from_camera);
   camera_.velocity_m_s = turn * camera_.velocity_m_s;
   first_pose_ = world_from_before.Move(first_pose_);
-  first_rotation_ = (world_from_before.rotation * first_rotation_).normalized();
   if (head_) {
     head_->rate.head<3>() = turn * head_->rate.head<3>();
     head_->covariance = (by.bottomRightCorner<6, 6>() * head_->covariance *

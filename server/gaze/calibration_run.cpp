@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/mount/mount_toml.hpp"
+#include "server/mount/mount_options.hpp"
 
 namespace saccade {
 namespace {

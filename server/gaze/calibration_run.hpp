@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
+#include "server/mount/calibration/mount_calibrator.hpp"
 #include "server/mount/mount.hpp"
-#include "server/mount/mount_calibrator.hpp"
 #include "shared/scene/gaze.hpp"
 
 namespace saccade {

@@ -3,6 +3,7 @@
 #include <absl/status/status.h>
 
 #include <filesystem>
+#include <string>
 
 namespace saccade {
 
@@ -48,6 +49,8 @@ struct GazeOptions {
   /// Reads the [gaze] table of a TOML file over the present values; a file without one changes
   /// nothing. NotFound, InvalidArgument: name file and key.
   absl::Status LoadToml(const std::filesystem::path& file);
+  /// That table with all defaults, each key with its range and meaning.
+  static std::string Describe();
 };
 
 }  // namespace saccade

@@ -11,6 +11,9 @@
 
 namespace saccade {
 
+/// A demanded rate counts for so long, then as zero: a silent server never leaves the head running.
+inline constexpr double kDemandHeld_s = 0.1;
+
 /// What the joints shall do, by MountJoint: be at `angles_rad` when the command takes effect, and
 /// go on at `rates_rad_s` until the next one. A driver without rate control ignores the rates.
 struct MountDemand {

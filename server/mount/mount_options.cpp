@@ -1,6 +1,7 @@
 #include "server/mount/mount_options.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "server/mount/toml_table.hpp"
+#include "shared/io/option_table.hpp"
+#include "shared/io/toml_table.hpp"
 
 namespace saccade {
 namespace {
@@ -17,15 +19,37 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr const char* kNames[] = {"pan", "elevation", "cyclotorsion"};
 constexpr double kMaxOffset_m = 1.0;
 
+const OptionTable<JointOptions>& JointTable() {
+  using O = JointOptions;
+  static const OptionTable<O> table = {
+      {"axis", &O::axis, 0, 0, "that it turns about, right-handed, in the link before it"},
+      {"offset_m", &O::offset_m, 0, 0, "from this axis to the next, or to the optic centre"},
+      {"min_deg", &O::min_rad, -720, 0, "limit", kDegree},
+      {"max_deg", &O::max_rad, 0, 720, "limit", kDegree},
+      {"max_rate_deg_s", &O::max_rate_rad_s, 1, 3600, "of the motor", kDegree},
+      {"max_acceleration_deg_s2", &O::max_acceleration_rad_s2, 10, 1e6, "of the motor", kDegree},
+      {"encoder_sign", &O::encoder_sign, -1, 1, "raw = sign * angle + zero; 1 or -1"},
+      {"encoder_zero_deg", &O::encoder_zero_rad, -360, 360, "raw angle at zero", kDegree},
+  };
+  return table;
+}
+
+const OptionTable<MountOptions>& MountTable() {
+  using O = MountOptions;
+  static const OptionTable<O> table = {
+      {"encoder_sigma_deg", &O::encoder_sigma_rad, 0, 10, "of one reading", kDegree},
+      {"encoder_delay_ms", &O::encoder_delay_s, -500, 500,
+       "time stamps of readings against those of pictures; drivers take it off", 1e-3},
+      {"command_latency_ms", &O::command_latency_s, 0, 500, "from command to first motion", 1e-3},
+  };
+  return table;
+}
+
 absl::Status Bad(const std::string& field, const std::string& value, const std::string& remedy) {
   return absl::InvalidArgumentError(absl::StrCat("mount_model.", field, ": ", value, "; ", remedy));
 }
 
-absl::Status InRange(const std::string& field, double value, double least, double most) {
-  if (value >= least && value <= most) return absl::OkStatus();
-  return Bad(field, absl::StrCat(value), absl::StrCat("give a number from ", least, " to ", most));
-}
-
+// What a range of one number cannot say.
 absl::Status ValidateJoint(const std::string& name, const JointOptions& joint) {
   if (!(std::abs(joint.axis.norm() - 1.0) < 1e-6)) {
     return Bad(name + ".axis", absl::StrCat("length ", joint.axis.norm()), "give a unit vector");
@@ -41,16 +65,12 @@ absl::Status ValidateJoint(const std::string& name, const JointOptions& joint) {
     return Bad(name + ".min_deg", absl::StrCat(joint.min_rad / kDegree),
                absl::StrCat("give less than max_deg, which is ", joint.max_rad / kDegree));
   }
-  for (const absl::Status& status :
-       {InRange(name + ".min_deg", joint.min_rad / kDegree, -720, 0),
-        InRange(name + ".max_deg", joint.max_rad / kDegree, 0, 720),
-        InRange(name + ".max_rate_deg_s", joint.max_rate_rad_s / kDegree, 1, 3600),
-        InRange(name + ".max_acceleration_deg_s2", joint.max_acceleration_rad_s2 / kDegree, 10,
-                1e6),
-        InRange(name + ".encoder_zero_deg", joint.encoder_zero_rad / kDegree, -360, 360)}) {
-    if (!status.ok()) return status;
-  }
-  return absl::OkStatus();
+  return JointTable().Validate(joint, absl::StrCat("mount_model.", name, "."));
+}
+
+std::string OrderLine(const MountOptions& options) {
+  return absl::StrFormat("order = [\"%s\", \"%s\", \"%s\"]", ToString(options.order[0]),
+                         ToString(options.order[1]), ToString(options.order[2]));
 }
 
 void ReadOrder(TomlTable& table, MountOptions& options) {
@@ -68,29 +88,15 @@ void ReadOrder(TomlTable& table, MountOptions& options) {
   }
 }
 
-void ReadJoint(TomlTable& table, JointOptions& joint) {
-  table.Vector("axis", joint.axis);
-  if (joint.axis.norm() > 0) joint.axis.normalize();
-  table.Vector("offset_m", joint.offset_m);
-  table.Number("min_deg", kDegree, joint.min_rad);
-  table.Number("max_deg", kDegree, joint.max_rad);
-  table.Number("max_rate_deg_s", kDegree, joint.max_rate_rad_s);
-  table.Number("max_acceleration_deg_s2", kDegree, joint.max_acceleration_rad_s2);
-  double sign = joint.encoder_sign;
-  table.Number("encoder_sign", 1.0, sign);
-  joint.encoder_sign = std::abs(sign) == 1.0 ? static_cast<int>(sign) : 0;
-  table.Number("encoder_zero_deg", kDegree, joint.encoder_zero_rad);
-  table.Finish().IgnoreError();  // kept by the file
-}
-
 void ReadMount(TomlTable& table, MountOptions& options) {
   ReadOrder(table, options);
-  table.Number("encoder_sigma_deg", kDegree, options.encoder_sigma_rad);
-  table.Number("encoder_delay_ms", 1e-3, options.encoder_delay_s);
-  table.Number("command_latency_ms", 1e-3, options.command_latency_s);
+  MountTable().Read(table, options);
   for (int k = 0; k < kMountJoints; ++k) {
     if (std::optional<TomlTable> joint = table.Table(kNames[k])) {
-      ReadJoint(*joint, options.of(static_cast<MountJoint>(k)));
+      JointOptions& out = options.of(static_cast<MountJoint>(k));
+      JointTable().Read(*joint, out);
+      if (out.axis.norm() > 0) out.axis.normalize();
+      joint->Finish().IgnoreError();  // kept by the file
     }
   }
 }
@@ -123,15 +129,34 @@ absl::Status MountOptions::Validate() const {
     const absl::Status status = ValidateJoint(kNames[k], joints[static_cast<std::size_t>(k)]);
     if (!status.ok()) return status;
   }
-  const absl::Status sigma = InRange("encoder_sigma_deg", encoder_sigma_rad / kDegree, 0, 10);
-  if (!sigma.ok()) return sigma;
-  const absl::Status delay = InRange("encoder_delay_ms", 1e3 * encoder_delay_s, -500, 500);
-  if (!delay.ok()) return delay;
-  return InRange("command_latency_ms", 1e3 * command_latency_s, 0, 500);
+  return MountTable().Validate(*this, "mount_model.");
 }
 
 absl::Status MountOptions::LoadToml(const std::filesystem::path& file) {
   return LoadTomlTable(file, "mount_model", ReadMount, *this);
+}
+
+std::string ToToml(const MountOptions& options) {
+  std::string text =
+      absl::StrCat("[mount_model]\n", OrderLine(options), "\n", MountTable().ToToml(options));
+  for (const MountJoint which : options.order) {
+    absl::StrAppend(&text, "\n[mount_model.", ToString(which), "]\n",
+                    JointTable().ToToml(options.of(which)));
+  }
+  return text;
+}
+
+std::string MountOptions::Describe() {
+  const MountOptions defaults;
+  std::string text =
+      absl::StrCat("[mount_model]\n",
+                   absl::StrFormat("%-44s # %s\n", OrderLine(defaults), "from the base outwards"),
+                   MountTable().Describe(defaults));
+  for (const MountJoint which : defaults.order) {
+    absl::StrAppend(&text, "[mount_model.", ToString(which), "]\n",
+                    JointTable().Describe(defaults.of(which)));
+  }
+  return text;
 }
 
 }  // namespace saccade

@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <numbers>
+#include <string>
 
 #include "server/mount/mount_angles.hpp"
 
@@ -50,6 +51,8 @@ struct MountOptions {
   ///   NotFound         no such file
   ///   InvalidArgument  not TOML, unknown key, wrong type or range: names file, key and remedy
   absl::Status LoadToml(const std::filesystem::path& file);
+  /// That table with all defaults, each key with its range and meaning.
+  static std::string Describe();
 
  private:
   static std::array<JointOptions, kMountJoints> DefaultJoints();
@@ -57,5 +60,8 @@ struct MountOptions {
 
 /// "pan", "elevation", "cyclotorsion".
 const char* ToString(MountJoint joint);
+
+/// The [mount_model] table that LoadToml reads back to the same options (to 1e-9).
+std::string ToToml(const MountOptions& options);
 
 }  // namespace saccade

@@ -1,19 +1,12 @@
 #include "server/rpc/annotation_service.hpp"
 
 #include "server/rpc/annotation_pages.hpp"
-#include "server/rpc/status.hpp"
+#include "server/rpc/unary_call.hpp"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade {
 namespace {
-
-grpc::ServerUnaryReactor* Refuse(grpc::ServerUnaryReactor* reactor, const char* method,
-                                 const std::string& session_id, const absl::Status& status) {
-  Audit(method, session_id, status);
-  reactor->Finish(ToGrpc(status));
-  return reactor;
-}
 
 wire::ImageSize ImageOf(const Backend& backend) {
   return {backend.facts().camera->width(), backend.facts().camera->height()};
@@ -25,7 +18,7 @@ absl::StatusOr<AnnotationPatch> PatchFromProto(const v1::UpdateAnnotationRequest
   if (absl::Status id = wire::CheckUuid(request.id(), "id"); !id.ok()) return id;
   patch.id = request.id();
   if (request.has_text()) {
-    absl::Status text = wire::CheckText(request.text(), wire::kMaxTextBytes, "text");
+    absl::Status text = wire::CheckText(request.text(), kMaxTextBytes, "text");
     if (!text.ok()) return text;
     patch.text = request.text();
   }
@@ -43,123 +36,105 @@ absl::StatusOr<AnnotationPatch> PatchFromProto(const v1::UpdateAnnotationRequest
   return patch;
 }
 
-}  // namespace
-
-void AnnotationService::Submit(grpc::ServerUnaryReactor* reactor, const char* method,
-                               const std::string& session_id, Command command) {
-  // Never blocks: the tracker thread resolves the anchor, the store commits, then `done` finishes.
-  const absl::Status queued = backend_.Submit(std::move(command));
-  if (!queued.ok()) Refuse(reactor, method, session_id, queued);
+template <typename Response>
+Done<Annotation> AnswerWithAnnotation(const UnaryCall& call, Response* response) {
+  return call.Answer<Annotation>([response](const Annotation& annotation) {
+    *response->mutable_annotation() = wire::ToProto(annotation);
+  });
 }
 
-template <typename Response>
-Done<Annotation> AnnotationService::Answer(grpc::ServerUnaryReactor* reactor, Response* response,
-                                           const char* method, const std::string& session_id) {
-  return [reactor, response, method, session_id](const absl::StatusOr<Annotation>& annotation) {
-    if (annotation.ok()) *response->mutable_annotation() = wire::ToProto(*annotation);
-    Audit(method, session_id, annotation.status());
-    reactor->Finish(ToGrpc(annotation.status()));
-  };
+}  // namespace
+
+template <typename Request, typename Make>
+grpc::ServerUnaryReactor* AnnotationService::Edit(grpc::CallbackServerContext* context,
+                                                  const Request* request, const char* method,
+                                                  Make make) {
+  UnaryCall call(*context, method, UnaryCall::Log::kAll);
+  const absl::StatusOr<Session> session = call.Editor(gate_, Toll::kEdit, request->session_id());
+  if (!session.ok()) return call.Finish(session.status());
+  absl::StatusOr<Command> command = make(call, *session);
+  if (!command.ok()) return call.Finish(command.status());
+  // Never blocks: the tracker thread resolves the anchor, the store commits, then `done` finishes.
+  return call.Submitted(backend_.Submit(*std::move(command)));
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext* context,
                                                     const v1::CreateAnnotationRequest* request,
                                                     v1::CreateAnnotationResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session =
-      gate_.Editor(*context, Toll::kEdit, request->session_id());
-  if (!session.ok()) return Refuse(reactor, "Create", "", session.status());
-  if (!request->request_id().empty()) {
-    absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
-    if (!uuid.ok()) return Refuse(reactor, "Create", session->participant_id, uuid);
-  }
-  absl::StatusOr<AnnotationDraft> draft = wire::FromProto(request->draft(), ImageOf(backend_));
-  if (!draft.ok()) return Refuse(reactor, "Create", session->participant_id, draft.status());
-  draft->request_id = request->request_id();
-  draft->author = session->display_name;
-  Submit(reactor, "Create", session->participant_id,
-         CreateAnnotation{session->participant_id, *std::move(draft),
-                          Answer(reactor, response, "Create", session->participant_id)});
-  return reactor;
+  return Edit(context, request, "Create",
+              [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
+                if (!request->request_id().empty()) {
+                  absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
+                  if (!uuid.ok()) return uuid;
+                }
+                absl::StatusOr<AnnotationDraft> draft =
+                    wire::FromProto(request->draft(), ImageOf(backend_));
+                if (!draft.ok()) return draft.status();
+                draft->request_id = request->request_id();
+                draft->author = session.display_name;
+                return CreateAnnotation{session.participant_id, *std::move(draft),
+                                        AnswerWithAnnotation(call, response)};
+              });
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext* context,
                                                     const v1::UpdateAnnotationRequest* request,
                                                     v1::UpdateAnnotationResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session =
-      gate_.Editor(*context, Toll::kEdit, request->session_id());
-  if (!session.ok()) return Refuse(reactor, "Update", "", session.status());
-  absl::StatusOr<AnnotationPatch> patch = PatchFromProto(*request, ImageOf(backend_));
-  if (!patch.ok()) return Refuse(reactor, "Update", session->participant_id, patch.status());
-  Submit(reactor, "Update", session->participant_id,
-         UpdateAnnotation{session->participant_id, *std::move(patch),
-                          Answer(reactor, response, "Update", session->participant_id)});
-  return reactor;
+  return Edit(context, request, "Update",
+              [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
+                absl::StatusOr<AnnotationPatch> patch = PatchFromProto(*request, ImageOf(backend_));
+                if (!patch.ok()) return patch.status();
+                return UpdateAnnotation{session.participant_id, *std::move(patch),
+                                        AnswerWithAnnotation(call, response)};
+              });
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext* context,
                                                     const v1::DeleteAnnotationRequest* request,
                                                     v1::DeleteAnnotationResponse* /*response*/) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session =
-      gate_.Editor(*context, Toll::kEdit, request->session_id());
-  if (!session.ok()) return Refuse(reactor, "Delete", "", session.status());
-  if (absl::Status uuid = wire::CheckUuid(request->id(), "id"); !uuid.ok()) {
-    return Refuse(reactor, "Delete", session->participant_id, uuid);
-  }
-  Submit(reactor, "Delete", session->participant_id,
-         DeleteAnnotation{session->participant_id, request->id(),
-                          [reactor, id = session->participant_id](const absl::Status& status) {
-                            Audit("Delete", id, status);
-                            reactor->Finish(ToGrpc(status));
-                          }});
-  return reactor;
+  return Edit(context, request, "Delete",
+              [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
+                absl::Status uuid = wire::CheckUuid(request->id(), "id");
+                if (!uuid.ok()) return uuid;
+                return DeleteAnnotation{session.participant_id, request->id(), call.Answer()};
+              });
 }
 
 grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* context,
                                                   const v1::ListAnnotationsRequest* request,
                                                   v1::ListAnnotationsResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (absl::Status often = gate_.Anyone(*context, Toll::kRead); !often.ok()) {
-    return Refuse(reactor, "List", "", often);
-  }
+  UnaryCall call(*context, "List", UnaryCall::Log::kRefusals);
+  if (absl::Status often = call.Anyone(gate_, Toll::kRead); !often.ok()) return call.Finish(often);
+  call.set_log(UnaryCall::Log::kNothing);
   // Not those of the newest frame: an edit that was answered is here at once. Held: the list is
   // replaced by every frame and edit meanwhile.
   const std::shared_ptr<const AnnotationList> annotations = backend_.annotations();
-  reactor->Finish(ToGrpc(ListPage(*annotations, *request, *response)));
-  return reactor;
+  return call.Finish(ListPage(*annotations, *request, *response));
 }
 
-template <typename Response>
+template <typename Request, typename Response>
 grpc::ServerUnaryReactor* AnnotationService::TakeBack(grpc::CallbackServerContext* context,
-                                                      const std::string& session_id, bool redo,
+                                                      const Request* request, bool redo,
                                                       Response* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const char* method = redo ? "Redo" : "Undo";
-  const absl::StatusOr<Session> session = gate_.Editor(*context, Toll::kEdit, session_id);
-  if (!session.ok()) return Refuse(reactor, method, "", session.status());
-  Submit(reactor, method, session->participant_id,
-         UndoChange{session->participant_id, redo,
-                    [reactor, response, method,
-                     id = session->participant_id](const absl::StatusOr<std::string>& description) {
-                      if (description.ok()) response->set_description(*description);
-                      Audit(method, id, description.status());
-                      reactor->Finish(ToGrpc(description.status()));
-                    }});
-  return reactor;
+  return Edit(context, request, redo ? "Redo" : "Undo",
+              [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
+                const auto fill = [response](const std::string& description) {
+                  response->set_description(description);
+                };
+                return UndoChange{session.participant_id, redo, call.Answer<std::string>(fill)};
+              });
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Undo(grpc::CallbackServerContext* context,
                                                   const v1::UndoAnnotationRequest* request,
                                                   v1::UndoAnnotationResponse* response) {
-  return TakeBack(context, request->session_id(), false, response);
+  return TakeBack(context, request, false, response);
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Redo(grpc::CallbackServerContext* context,
                                                   const v1::RedoAnnotationRequest* request,
                                                   v1::RedoAnnotationResponse* response) {
-  return TakeBack(context, request->session_id(), true, response);
+  return TakeBack(context, request, true, response);
 }
 
 }  // namespace saccade

@@ -3,7 +3,6 @@
 #include "saccade/v1/annotation.grpc.pb.h"
 #include "server/rpc/backend.hpp"
 #include "server/rpc/gatekeeper.hpp"
-#include "server/rpc/stream_hub.hpp"
 
 namespace saccade {
 
@@ -33,14 +32,14 @@ class AnnotationService final : public v1::AnnotationService::CallbackService {
                                  const v1::RedoAnnotationRequest* request,
                                  v1::RedoAnnotationResponse* response) override;
 
-  template <typename Response>
-  Done<Annotation> Answer(grpc::ServerUnaryReactor* reactor, Response* response, const char* method,
-                          const std::string& session_id);
-  template <typename Response>
-  grpc::ServerUnaryReactor* TakeBack(grpc::CallbackServerContext* context,
-                                     const std::string& session_id, bool redo, Response* response);
-  void Submit(grpc::ServerUnaryReactor* reactor, const char* method, const std::string& session_id,
-              Command command);
+  /// A call of an editor that is one command for the tracker thread: `make(call, session)` checks
+  /// the request and makes it.
+  template <typename Request, typename Make>
+  grpc::ServerUnaryReactor* Edit(grpc::CallbackServerContext* context, const Request* request,
+                                 const char* method, Make make);
+  template <typename Request, typename Response>
+  grpc::ServerUnaryReactor* TakeBack(grpc::CallbackServerContext* context, const Request* request,
+                                     bool redo, Response* response);
 
   Backend& backend_;
   Gatekeeper& gate_;

@@ -41,12 +41,13 @@ class GazeService final : public v1::GazeService::CallbackService {
   Reactor* Pause(Context* context, const v1::PauseRequest* request,
                  v1::PauseResponse* response) override;
 
-  absl::StatusOr<GazeCaller> CallerOf(const Context& context, const std::string& session_id);
+  /// A call of an editor that is one command for the gaze thread: `make(call, caller)` checks the
+  /// request and makes it.
+  template <typename Request, typename Make>
+  Reactor* Order(Context* context, const Request* request, const char* method, Make make);
   template <typename Request, typename Response>
   Reactor* Steer(Context* context, const Request* request, Response* response, const char* method,
                  SteerGaze::What what);
-  void Submit(Reactor* reactor, const char* method, const std::string& session_id,
-              GazeCommand command);
 
   Backend& backend_;
   Gatekeeper& gate_;

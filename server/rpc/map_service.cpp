@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/rpc/deltas.hpp"
-#include "server/rpc/status.hpp"
+#include "server/rpc/unary_call.hpp"
 
 namespace saccade {
 namespace {
@@ -47,49 +47,33 @@ absl::Status NoMapYet() {
 grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
                                           const v1::GetMapRequest* /*request*/,
                                           v1::GetMapResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (absl::Status often = gate_.Anyone(*context, Toll::kRead); !often.ok()) {
-    reactor->Finish(ToGrpc(often));
-    return reactor;
-  }
+  const UnaryCall call(*context, "Map.Get", UnaryCall::Log::kNothing);
+  if (absl::Status often = call.Anyone(gate_, Toll::kRead); !often.ok()) return call.Finish(often);
   const std::optional<TrackedEvent> newest = hub_.newest();
-  if (newest) {
-    *response->mutable_map() = FullMap(*newest->snapshot);
-    response->set_metric(newest->snapshot->metric);
-  }
-  reactor->Finish(ToGrpc(newest ? absl::OkStatus() : NoMapYet()));
-  return reactor;
+  if (!newest) return call.Finish(NoMapYet());
+  *response->mutable_map() = FullMap(*newest->snapshot);
+  response->set_metric(newest->snapshot->metric);
+  return call.Finish(absl::OkStatus());
 }
 
 grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context,
                                             const v1::ResetMapRequest* request,
                                             v1::ResetMapResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Session> session =
-      gate_.Editor(*context, Toll::kReset, request->session_id());
-  const std::string id = session.ok() ? session->participant_id : "";
-  absl::Status status = session.status();
-  if (status.ok()) {
-    status = backend_.Submit(
-        ResetMap{[reactor, response, id](const absl::StatusOr<std::uint64_t>& generation) {
-          if (generation.ok()) response->set_map_generation(*generation);
-          Audit("Map.Reset", id, generation.status());
-          reactor->Finish(ToGrpc(generation.status()));
-        }});
-  }
-  if (!status.ok()) {
-    Audit("Map.Reset", id, status);
-    reactor->Finish(ToGrpc(status));
-  }
-  return reactor;
+  UnaryCall call(*context, "Map.Reset", UnaryCall::Log::kAll);
+  const absl::StatusOr<Session> session = call.Editor(gate_, Toll::kReset, request->session_id());
+  if (!session.ok()) return call.Finish(session.status());
+  const auto fill = [response](std::uint64_t generation) {
+    response->set_map_generation(generation);
+  };
+  return call.Submitted(backend_.Submit(ResetMap{call.Answer<std::uint64_t>(fill)}));
 }
 
 grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* context,
                                              const v1::ExportMapRequest* request,
                                              v1::ExportMapResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const UnaryCall call(*context, "Map.Export", UnaryCall::Log::kNothing);
   const std::optional<TrackedEvent> newest = hub_.newest();
-  absl::Status status = gate_.Anyone(*context, Toll::kRead);
+  absl::Status status = call.Anyone(gate_, Toll::kRead);
   if (status.ok() && !newest) status = NoMapYet();
   if (request->format() != v1::ExportMapRequest::FORMAT_PLY &&
       request->format() != v1::ExportMapRequest::FORMAT_UNSPECIFIED) {
@@ -100,8 +84,7 @@ grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* contex
     response->set_data(ToPly(*newest->snapshot));
     response->set_feature_count(static_cast<std::uint32_t>(newest->snapshot->features.size()));
   }
-  reactor->Finish(ToGrpc(status));
-  return reactor;
+  return call.Finish(status);
 }
 
 }  // namespace saccade

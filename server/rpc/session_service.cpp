@@ -4,15 +4,11 @@
 
 #include "server/rpc/status.hpp"
 #include "server/rpc/stream_writer.hpp"
+#include "server/rpc/unary_call.hpp"
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade {
 namespace {
-
-grpc::ServerUnaryReactor* Finish(grpc::ServerUnaryReactor* reactor, const absl::Status& status) {
-  reactor->Finish(ToGrpc(status));
-  return reactor;
-}
 
 // A stream that cannot start.
 class RefusedStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
@@ -31,12 +27,11 @@ SessionService::SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gat
 grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* context,
                                                const v1::JoinRequest* request,
                                                v1::JoinResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::Status often = gate_.Anyone(*context, Toll::kJoin);
-  const absl::StatusOr<Session> session =
-      often.ok() ? gate_.sessions().Join(*request) : absl::StatusOr<Session>(often);
-  Audit("Join", session.ok() ? session->participant_id : "", session.status());
-  if (!session.ok()) return Finish(reactor, session.status());
+  UnaryCall call(*context, "Join", UnaryCall::Log::kAll);
+  if (absl::Status often = call.Anyone(gate_, Toll::kJoin); !often.ok()) return call.Finish(often);
+  const absl::StatusOr<Session> session = gate_.sessions().Join(*request);
+  if (!session.ok()) return call.Finish(session.status());
+  call.Is(*session);
   const ServerFacts& facts = backend_.facts();
   response->set_session_id(session->id);
   response->set_participant_id(session->participant_id);
@@ -44,7 +39,7 @@ grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* cont
   response->set_source(facts.source);
   *response->mutable_intrinsics() = wire::ToProto(facts.camera->intrinsics());
   response->set_source_fps_hz(facts.camera->intrinsics().fps);
-  return Finish(reactor, absl::OkStatus());
+  return call.Finish(absl::OkStatus());
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::Subscribe(
@@ -66,12 +61,12 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::Subscribe(
 grpc::ServerUnaryReactor* SessionService::Acknowledge(grpc::CallbackServerContext* context,
                                                       const v1::AcknowledgeRequest* request,
                                                       v1::AcknowledgeResponse* /*response*/) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const UnaryCall call(*context, "Acknowledge", UnaryCall::Log::kNothing);
   // Costs nothing that could be limited.
   const absl::StatusOr<Session> session = gate_.sessions().Find(request->session_id());
-  if (!session.ok()) return Finish(reactor, session.status());
-  return Finish(reactor,
-                hub_.Acknowledge(session->id, request->sequence(), request->request_key_frame()));
+  if (!session.ok()) return call.Finish(session.status());
+  return call.Finish(
+      hub_.Acknowledge(session->id, request->sequence(), request->request_key_frame()));
 }
 
 grpc::ServerUnaryReactor* SessionService::Ping(grpc::CallbackServerContext* context,
@@ -80,43 +75,38 @@ grpc::ServerUnaryReactor* SessionService::Ping(grpc::CallbackServerContext* cont
   response->set_server_receive_ns(MonotonicNow());
   response->set_client_send_ns(request->client_send_ns());
   response->set_server_send_ns(MonotonicNow());
-  return Finish(context->DefaultReactor(), absl::OkStatus());
+  return UnaryCall(*context, "Ping", UnaryCall::Log::kNothing).Finish(absl::OkStatus());
 }
 
 grpc::ServerUnaryReactor* SessionService::GetFrame(grpc::CallbackServerContext* context,
                                                    const v1::GetFrameRequest* request,
                                                    v1::GetFrameResponse* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (absl::Status often = gate_.Anyone(*context, Toll::kStill); !often.ok()) {
-    return Finish(reactor, often);
-  }
+  const UnaryCall call(*context, "GetFrame", UnaryCall::Log::kNothing);
+  if (absl::Status often = call.Anyone(gate_, Toll::kStill); !often.ok()) return call.Finish(often);
   if (!v1::VideoView_IsValid(request->view())) {
-    return Finish(reactor, absl::InvalidArgumentError(absl::StrCat(
-                               "view: unknown view ", static_cast<int>(request->view()))));
+    return call.Finish(absl::InvalidArgumentError(
+        absl::StrCat("view: unknown view ", static_cast<int>(request->view()))));
   }
   std::optional<FrameId> frame_id;
   if (request->has_frame_id()) frame_id = request->frame_id();
   const VideoView view =
       request->view() == v1::VIDEO_VIEW_AUGMENTED ? VideoView::kAugmented : VideoView::kRaw;
-  backend_.GetStill(frame_id, view, [reactor, response](const absl::StatusOr<Still>& still) {
-    if (still.ok()) {
-      const TrackedEvent& tracked = still->tracked;
-      response->set_frame_id(tracked.snapshot->frame_id);
-      response->set_png(*still->png);
-      *response->mutable_intrinsics() = wire::ToProto(tracked.camera->intrinsics());
-      *response->mutable_pose() = wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns);
-    }
-    reactor->Finish(ToGrpc(still.status()));
-  });
-  return reactor;
+  const auto fill = [response](const Still& still) {
+    const TrackedEvent& tracked = still.tracked;
+    response->set_frame_id(tracked.snapshot->frame_id);
+    response->set_png(*still.png);
+    *response->mutable_intrinsics() = wire::ToProto(tracked.camera->intrinsics());
+    *response->mutable_pose() = wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns);
+  };
+  backend_.GetStill(frame_id, view, call.Answer<Still>(fill));
+  return call.reactor();
 }
 
 grpc::ServerUnaryReactor* SessionService::GetStatus(grpc::CallbackServerContext* context,
                                                     const v1::GetStatusRequest* /*request*/,
                                                     v1::GetStatusResponse* response) {
-  if (absl::Status often = gate_.Anyone(*context, Toll::kRead); !often.ok()) {
-    return Finish(context->DefaultReactor(), often);
-  }
+  const UnaryCall call(*context, "GetStatus", UnaryCall::Log::kNothing);
+  if (absl::Status often = call.Anyone(gate_, Toll::kRead); !often.ok()) return call.Finish(often);
   if (const std::optional<TrackedEvent> newest = hub_.newest()) {
     *response->mutable_pose() = wire::ToProtoPose(*newest->snapshot, newest->stages.captured_ns);
     response->set_map_features(static_cast<std::uint32_t>(newest->snapshot->features.size()));
@@ -128,7 +118,7 @@ grpc::ServerUnaryReactor* SessionService::GetStatus(grpc::CallbackServerContext*
   response->set_server_version(backend_.facts().version);
   response->set_uptime_s(Seconds(MonotonicNow() - started_ns_));
   response->set_source_ended(hub_.end_of_source().has_value());
-  return Finish(context->DefaultReactor(), absl::OkStatus());
+  return call.Finish(absl::OkStatus());
 }
 
 }  // namespace saccade

@@ -94,7 +94,7 @@ void SimSource::Request(FrameId frame) {
   });
 }
 
-void SimSource::DriveHead(std::shared_ptr<HeadMotion> head) {
+void SimSource::DriveHead(std::shared_ptr<SimulatedHead> head) {
   head_ = std::move(head);
   info_.mount = std::make_shared<const MountModel>(head_->model());
 }

@@ -12,7 +12,7 @@
 #include "server/capture/frame_source.hpp"
 #include "server/capture/source.hpp"
 #include "server/gl/gl_context.hpp"
-#include "server/mount/head_motion.hpp"
+#include "server/mount/simulated_head.hpp"
 #include "server/sim/ray_caster.hpp"
 #include "server/sim/render_thread.hpp"
 #include "server/sim/sim_camera.hpp"
@@ -47,7 +47,7 @@ class SimSource final : public FrameSource {
 
   /// The head that turns the camera; its clock is that of the capture times. Before the first
   /// Next(). Frames then carry what its encoders said at mid-exposure.
-  void DriveHead(std::shared_ptr<HeadMotion> head);
+  void DriveHead(std::shared_ptr<SimulatedHead> head);
 
   /// From now on the truth of each frame is written before Next() hands the frame out.
   absl::Status WriteTruthTo(const std::filesystem::path& file);
@@ -105,7 +105,7 @@ class SimSource final : public FrameSource {
   std::unique_ptr<SimCamera> camera_;  // touched on thread_ alone
   FrameId next_ = 0;
   std::optional<Timestamp> clock_zero_ns_;  // capture time of frame 0, once the source runs
-  std::shared_ptr<HeadMotion> head_;
+  std::shared_ptr<SimulatedHead> head_;
   mutable std::mutex heads_mutex_;
   std::map<FrameId, MountAngles> heads_;  // of the frames drawn so far
   FrameId requested_ = 0;

@@ -98,6 +98,8 @@ struct TrackerOptions {
   absl::Status LoadToml(const std::filesystem::path& file);
   /// Names of all keys.
   static std::vector<std::string> Keys();
+  /// The [tracker] table with all defaults, each key with its range and meaning.
+  static std::string Describe();
 };
 
 }  // namespace saccade

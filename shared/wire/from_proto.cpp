@@ -77,7 +77,7 @@ absl::Status CheckInk(const v1::AnnotationDraft& message, absl::string_view fiel
     return message.ink_px().empty() ? absl::OkStatus() : Bad(ink, "only an INK shape has a stroke");
   }
   if (message.ink_px_size() < 2) return Bad(ink, "a stroke has at least 2 points");
-  if (message.ink_px_size() > kMaxInkPoints) {
+  if (static_cast<std::size_t>(message.ink_px_size()) > kMaxInkPoints) {
     return Bad(ink,
                absl::StrCat("at most ", kMaxInkPoints, " points, not ", message.ink_px_size()));
   }

@@ -11,6 +11,7 @@
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
 #include "shared/scene/annotation.hpp"
+#include "shared/scene/limits.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 /// Messages to domain structs. Whatever arrives is checked here and nowhere else: finite numbers,
@@ -24,13 +25,10 @@ struct ImageSize {
   int width = 0, height = 0;  // [px]
 };
 
-inline constexpr double kMaxSizeM = 10.0;
+// shared/scene/limits.hpp has the rest.
 inline constexpr double kMinSizeM = 1e-3;
 inline constexpr double kDefaultSizeM = 0.05;
-inline constexpr double kMaxCoordinateM = 1e4;
-inline constexpr std::size_t kMaxTextBytes = 500;
 inline constexpr std::size_t kMaxNameBytes = 60;
-inline constexpr int kMaxInkPoints = 2000;
 
 absl::StatusOr<Eigen::Vector3d> FromProto(const v1::Vector3& message, absl::string_view field);
 absl::StatusOr<Rigid3> FromProto(const v1::Rigid3& message, absl::string_view field);

@@ -15,10 +15,9 @@ using std::string_view;
 
 // Listed along the data flow: a folder includes only itself and those before it.
 constexpr auto kServerOrder = std::to_array<string_view>(
-    {"pipeline", "mount", "gl", "capture", "sim", "scene", "features", "filter", "map", "tracker",
-     "anchors", "gaze", "wearable", "overlay", "encode", "store", "rpc", "gateway", "eval", "app"});
-constexpr auto kClientOrder =
-    std::to_array<string_view>({"net", "session", "decode", "tools", "view", "cli", "app"});
+    {"pipeline", "mount", "gl", "capture", "sim", "features", "filter", "map", "tracker", "anchors",
+     "gaze", "wearable", "overlay", "encode", "store", "rpc", "gateway", "eval", "app"});
+constexpr auto kClientOrder = std::to_array<string_view>({"net", "cli"});
 constexpr auto kSharedOrder =
     std::to_array<string_view>({"io", "geometry", "time", "camera", "scene", "wire", "render"});
 
@@ -47,15 +46,15 @@ const std::vector<Home>& Homes() {
       {"grpcpp/", {"server/rpc", "server/gateway", "server/app", "client/net"}},
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},
-      {"wels/", {"server/encode", "client/decode"}},
+      {"wels/", {"server/encode"}},
       {"GL/osmesa.h", {"server/gl"}},
       {"EGL/", {"server/gl"}},
-      {"GLFW/", {"client/view", "client/app"}},
+      {"GLFW/", {}},
       {"hb.h", {"server/overlay"}},
       {"ft2build.h", {"server/overlay"}},
       {"fribidi.h", {"server/overlay"}},
       {"fontconfig/", {"server/overlay"}},
-      {"opencv2/videoio", {"server/decode"}},
+      {"opencv2/videoio", {}},
       {"opencv2/highgui", {}},
   };
   return homes;
@@ -88,6 +87,11 @@ bool Contains(std::span<const string_view> list, string_view item) {
 std::optional<std::string> CheckProjectInclude(string_view file, string_view target) {
   const string_view side = SideOf(file), target_side = SideOf(target);
   if (target_side == "tests") return "only tests see tests/";
+  // An integrator's program: the public API and the plain structs it speaks in.
+  if (side == "examples") {
+    if (target_side == "shared" || FolderOf(target) == "client/net") return std::nullopt;
+    return "examples see only client/net and shared";
+  }
   if (side == "shared" && target_side != "shared") return "shared sees only shared and proto";
   if (side != target_side && target_side != "shared") {
     return std::string(side) + " never sees " + std::string(target_side);
@@ -219,13 +223,41 @@ Scan ScanFile(string_view file, string_view text) {
 
 }  // namespace
 
+std::vector<std::string> ProjectIncludes(string_view text) {
+  std::vector<std::string> includes;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const auto end = std::min(text.find('\n', begin), text.size());
+    const auto include = ParseInclude(text.substr(begin, end - begin));
+    begin = end + 1;
+    if (include && OrderOf(SideOf(include->first))) includes.emplace_back(include->first);
+  }
+  return includes;
+}
+
+std::vector<std::string> FoldersOfTheRules() {
+  std::vector<std::string> folders;
+  for (const char* side : {"server", "client", "shared"}) {
+    const std::span<const string_view> order = *OrderOf(side);
+    for (const string_view name : order) {
+      folders.push_back(std::string(side).append("/").append(name));
+    }
+  }
+  for (const Restriction& each : Restrictions()) {
+    folders.insert(folders.end(), each.may_see.begin(), each.may_see.end());
+  }
+  for (const Home& home : Homes()) {
+    folders.insert(folders.end(), home.folders.begin(), home.folders.end());
+  }
+  return folders;
+}
+
 std::vector<Violation> CheckFile(string_view file, string_view text) {
   return ScanFile(file, text).violations;
 }
 
 TreeReport CheckTree(const std::filesystem::path& root) {
   TreeReport report;
-  for (const char* top : {"shared", "server", "client", "web/src"}) {
+  for (const char* top : {"shared", "server", "client", "examples/cpp", "web/src"}) {
     if (!std::filesystem::exists(root / top)) continue;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(root / top)) {
       const std::string file = std::filesystem::relative(entry.path(), root).generic_string();

@@ -21,13 +21,19 @@ struct Violation {
 /// folder stay there; web sees nothing outside web. Tests may include anything.
 std::vector<Violation> CheckFile(std::string_view file, std::string_view text);
 
+/// What `text` includes of shared/, server/ and client/, as written.
+std::vector<std::string> ProjectIncludes(std::string_view text);
+/// Every folder that the rules name, from the root.
+std::vector<std::string> FoldersOfTheRules();
+
 struct TreeReport {
   int files = 0;
   int includes = 0;
   std::vector<Violation> violations;
 };
 
-/// Checks every source file below shared/, server/, client/ and web/src/ of the tree at `root`.
+/// Checks every source file below shared/, server/, client/, examples/cpp/ and web/src/ of the tree
+/// at `root`.
 TreeReport CheckTree(const std::filesystem::path& root);
 
 }  // namespace saccade::lint

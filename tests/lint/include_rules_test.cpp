@@ -55,6 +55,13 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"server/filter/a.cpp", "#include \"tests/support/world.hpp\"", false}));
 
 INSTANTIATE_TEST_SUITE_P(
+    Examples, IncludeRule,
+    testing::Values(Case{"examples/cpp/a.cpp", "#include \"client/net/connection.hpp\"", true},
+                    Case{"examples/cpp/a.cpp", "#include \"shared/scene/annotation.hpp\"", true},
+                    Case{"examples/cpp/a.cpp", "#include \"client/cli/json.hpp\"", false},
+                    Case{"examples/cpp/a.cpp", "#include \"server/rpc/status.hpp\"", false}));
+
+INSTANTIATE_TEST_SUITE_P(
     Narrow, IncludeRule,
     testing::Values(Case{"server/rpc/a.cpp", "#include \"server/tracker/tracker.hpp\"", false},
                     Case{"server/rpc/a.cpp", "#include \"server/filter/ekf.hpp\"", false},

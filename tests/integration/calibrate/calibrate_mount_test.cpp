@@ -10,7 +10,7 @@
 #include <random>
 
 #include "server/gaze/gaze_loop.hpp"
-#include "server/mount/sim_mount.hpp"
+#include "server/mount/drivers/sim_mount.hpp"
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 

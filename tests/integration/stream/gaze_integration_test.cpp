@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "server/mount/sim_mount.hpp"
+#include "server/mount/drivers/sim_mount.hpp"
 #include "tests/integration/stream/in_process_server.hpp"
 #include "tests/integration/stream/test_client.hpp"
 

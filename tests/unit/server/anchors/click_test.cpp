@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "shared/scene/limits.hpp"
 #include "tests/unit/server/anchors/rig.hpp"
 
 namespace saccade {
@@ -160,6 +161,11 @@ TEST(Click, RefusesWhatCannotBeResolved) {
   AnnotationDraft draft;
   draft.target = FeatureTarget{999999};
   EXPECT_EQ(rig.manager.Create(draft, "e").status().code(), absl::StatusCode::kNotFound);
+  // As far as the API lets a coordinate be, and no further (shared/scene/limits.hpp).
+  draft.target = PointTarget{{0, -1.1 * kMaxCoordinateM, 0}};
+  EXPECT_EQ(rig.manager.Create(draft, "e").status().code(), absl::StatusCode::kInvalidArgument);
+  draft.target = RayTarget{{1.1 * kMaxCoordinateM, 0, 0}, {0, 0, 1}};
+  EXPECT_EQ(rig.manager.Create(draft, "e").status().code(), absl::StatusCode::kInvalidArgument);
   draft.target = PointTarget{{nan, 0, 0}};
   EXPECT_EQ(rig.manager.Create(draft, "e").status().code(), absl::StatusCode::kInvalidArgument);
   draft.target = RayTarget{{0, 0, 0}, {0, 0, 0}};

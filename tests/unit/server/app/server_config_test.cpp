@@ -7,6 +7,10 @@
 #include <cstdio>
 #include <fstream>
 
+#include "server/gaze/gaze_options.hpp"
+#include "server/mount/drivers/drivers.hpp"
+#include "server/tracker/tracker_options.hpp"
+
 namespace saccade {
 namespace {
 
@@ -104,6 +108,35 @@ TEST(ServerConfig, TheFileIsReadAndFlagsWin) {
   EXPECT_EQ(config.grpc.port, 2);
   EXPECT_EQ(config.video_bit_rate_bit_s, 900'000);
   EXPECT_EQ(config.config_file, file);
+}
+
+// Every key that exists is in what --print-config prints, with its default.
+TEST(ServerConfig, ThePrintedFileSaysEverythingAndChangesNothing) {
+  ::testing::internal::CaptureStdout();
+  const auto printed = Parse({"--print-config"});
+  const std::string text = ::testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(printed.ok()) << printed.status();
+  EXPECT_FALSE(printed->has_value());
+  for (const char* words :
+       {"mount = \"none\"", "grpc = \"127.0.0.1:50051\"", "[video]", "[limits]", "[tracker]",
+        "pixel_sigma_px = 0.5", "[gaze]", "[mount_model.pan]", "[dynamixel]", "[v4l2]"}) {
+    EXPECT_THAT(text, HasSubstr(words));
+  }
+  const std::string file = Toml(text);
+  const ServerConfig config = Good({"--config", file, "--source", "sim:desk"});
+  const ServerConfig plain = Good({"--source", "sim:desk"});
+  EXPECT_EQ(config.mount, plain.mount);
+  EXPECT_EQ(config.data_dir, plain.data_dir);
+  EXPECT_EQ(config.grpc.port, plain.grpc.port);
+  EXPECT_EQ(config.seed, plain.seed);
+  EXPECT_EQ(config.limits_scale, plain.limits_scale);
+  EXPECT_EQ(config.video_bit_rate_bit_s, plain.video_bit_rate_bit_s);
+  TrackerOptions tracker;
+  EXPECT_TRUE(tracker.LoadToml(file).ok()) << tracker.LoadToml(file);
+  EXPECT_EQ(tracker.pixel_sigma_px, TrackerOptions().pixel_sigma_px);
+  GazeOptions gaze;
+  EXPECT_TRUE(gaze.LoadToml(file).ok()) << gaze.LoadToml(file);
+  EXPECT_TRUE(MountDrivers().Open("none", {.config_file = file}).ok());
 }
 
 TEST(ServerConfig, ABadFileIsNamedWithItsKey) {

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "server/gaze/gaze_loop.hpp"
-#include "server/mount/sim_mount.hpp"
+#include "server/mount/drivers/sim_mount.hpp"
 
 namespace saccade {
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/gaze/gaze_loop.hpp"
-#include "server/mount/crop_mount.hpp"
+#include "server/mount/drivers/crop_mount.hpp"
 #include "tests/support/pinhole.hpp"
 
 namespace saccade {

@@ -3,7 +3,7 @@
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 
-#include "server/mount/sim_mount.hpp"
+#include "server/mount/drivers/sim_mount.hpp"
 #include "tests/unit/server/sim/open_sim.hpp"
 
 namespace saccade {

@@ -106,7 +106,7 @@ TEST(DraftFromProto, AStrokeBelongsToInkAndToAFrame) {
   EXPECT_THAT(ErrorOf(draft), StartsWith("draft.target: "));
   draft = GoodDraft();
   draft.set_shape(v1::ANNOTATION_SHAPE_INK);
-  for (int i = 0; i < wire::kMaxInkPoints + 1; ++i) draft.add_ink_px();
+  for (std::size_t i = 0; i < kMaxInkPoints + 1; ++i) draft.add_ink_px();
   EXPECT_THAT(ErrorOf(draft), StartsWith("draft.ink_px: "));
 }
 
