@@ -40,11 +40,11 @@ struct ServerConfig {
   double limits_scale = 1;         // limits.scale: of server/rpc/admission.hpp; 0: none
   std::filesystem::path web_root;  // web_root
   std::uint64_t seed = 1;          // seed
-  std::filesystem::path
-      config_file;  // its [tracker], [gaze] and [mount_model] tables are theirs to read
+  /// Its [tracker], [gaze], [mount_model] and drivers' tables are theirs to read.
+  std::filesystem::path config_file;
 
-  /// Parses the command line. An error is bad usage (exit 2); `--help` and `--version` print and
-  /// give nothing.
+  /// Parses the command line. An error is bad usage (exit 2); `--help`, `--version` and
+  /// `--print-config` print and give nothing.
   static absl::StatusOr<std::optional<ServerConfig>> FromCommandLine(int argc, char** argv);
 };
 
