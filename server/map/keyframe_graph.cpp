@@ -265,6 +265,7 @@ std::optional<KeyframeGraph::Job> KeyframeGraph::MakeJob(const Lookup& estimate)
   ChoosePoints(estimate, job);
   AddSightings(job);
   if (!ShowsParallax(job)) return std::nullopt;
+  FindRecent(job);
   return job;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -78,6 +79,10 @@ class KeyframeGraph {
     std::vector<KeyframeId> keyframes;  // rising
     std::vector<FeatureId> points;
     KeyframeId newest = -1;
+    /// Index of the first keyframe of the newest stretch that is in it without a gap; what lies
+    /// before is the old part, met again.
+    std::size_t first_recent = 0;
+    std::vector<double> distances_m;  // of the keyframes, to what was in view
   };
   using Lookup = std::function<std::optional<GraphEstimate>(FeatureId)>;
   /// `estimate`: a feature as the filter has it now, if it still does. Nothing while too few points
@@ -150,6 +155,8 @@ class KeyframeGraph {
   void ChooseKeyframes(const std::vector<KeyframeId>& adjusted, Job& job) const;
   void ChoosePoints(const Lookup& estimate, Job& job) const;
   void AddSightings(Job& job) const;
+  /// Says which of the job's keyframes are recent.
+  void FindRecent(Job& job) const;
   /// Whether enough points of the newest keyframe show parallax; keyframes that see few of those
   /// are held: where depth is only guessed, a turn and a sideways step look alike.
   bool ShowsParallax(Job& job) const;
@@ -160,5 +167,11 @@ class KeyframeGraph {
   KeyframeId next_ = 0;
   std::uint64_t changes_ = 0;  // never counted back: versions of a cleared graph mean nothing now
 };
+
+/// AdjustBundle for a job. The old part of a map is right by more looks than the new one; where the
+/// two do not meet (drift), an adjustment that is free to would bend the old to the new, and tear
+/// it where its view ends. So if it moves an old keyframe further than that may be wrong, it is
+/// done again with the old part held. False: as AdjustBundle.
+bool AdjustJob(KeyframeGraph::Job& job, const std::atomic<bool>& stop);
 
 }  // namespace saccade

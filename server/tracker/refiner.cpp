@@ -42,7 +42,7 @@ void Refiner::Start(std::int64_t frame, Timestamp time_ns, const Map& map, Filte
     // Late is no loss, but pictures and heartbeats are: what is live comes first.
     if (options_.adjust_live) setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
     std::optional<KeyframeGraph::Job> done;
-    if (AdjustBundle(job.problem, stop_)) done = std::move(job);
+    if (AdjustJob(job, stop_)) done = std::move(job);
     return done;
   });
 }

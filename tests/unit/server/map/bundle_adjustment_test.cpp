@@ -187,6 +187,77 @@ TEST(KeyframeGraph, MakesAJobThatAdjusts) {
   EXPECT_NE(next->problem.points.front().inverse_range, 0.5) << "what was found is not taken over";
 }
 
+/// Five old keyframes that are off by noise of `old_m`, and five recent ones that are `drift_m`
+/// aside, two of which are held, as the newest stretch's own past is.
+KeyframeGraph::Job BackAtAnOldPlace(Arc& arc, double old_m, double drift_m) {
+  KeyframeGraph::Job job;
+  job.problem = arc.Problem();
+  for (int k = 0; k < 10; ++k) {
+    BundleKeyframe& keyframe = job.problem.keyframes[static_cast<std::size_t>(k)];
+    keyframe.world_from_camera = arc.poses()[static_cast<std::size_t>(k)];
+    keyframe.world_from_camera.translation +=
+        k < 5 ? arc.Noise(old_m) : Eigen::Vector3d(0.0, drift_m, 0.0);
+    keyframe.fixed = k == 5 || k == 6;
+    job.keyframes.push_back(k < 5 ? k : 20 + k);
+    job.distances_m.push_back(2.0);
+  }
+  job.first_recent = 5;
+  job.newest = 29;
+  return job;
+}
+
+double MovedOfOld(const KeyframeGraph::Job& before, const KeyframeGraph::Job& after) {
+  double most = 0.0;
+  for (std::size_t k = 0; k < before.first_recent; ++k) {
+    most = std::max(most, (after.problem.keyframes[k].world_from_camera.translation -
+                           before.problem.keyframes[k].world_from_camera.translation)
+                              .norm());
+  }
+  return most;
+}
+
+TEST(AdjustJob, AnOldPartIsNotBentToADriftedNewOne) {
+  Arc arc(10, 60, 0.5);
+  const KeyframeGraph::Job before = BackAtAnOldPlace(arc, 0.0, 0.08);
+  KeyframeGraph::Job bent = before, job = before;
+  ASSERT_TRUE(AdjustBundle(bent.problem, false));
+  ASSERT_GT(MovedOfOld(before, bent), 0.02) << "the scene is too easy for this test";
+  ASSERT_TRUE(AdjustJob(job, false));
+  EXPECT_EQ(MovedOfOld(before, job), 0.0);
+  // What is free of the new part comes to where the old part has it.
+  const Rigid3& newest = job.problem.keyframes.back().world_from_camera;
+  EXPECT_LT((newest.translation - arc.poses().back().translation).norm(), 0.02);
+}
+
+TEST(AdjustJob, AnOldPartThatIsALittleOffIsAdjusted) {
+  Arc arc(10, 60, 0.5);
+  const KeyframeGraph::Job before = BackAtAnOldPlace(arc, 0.004, 0.0);
+  KeyframeGraph::Job plain = before, job = before;
+  ASSERT_TRUE(AdjustBundle(plain.problem, false));
+  ASSERT_TRUE(AdjustJob(job, false));
+  EXPECT_GT(MovedOfOld(before, job), 0.001);
+  EXPECT_EQ(MovedOfOld(before, job), MovedOfOld(before, plain));
+}
+
+TEST(KeyframeGraph, TheNewestStretchWithoutAGapIsRecent) {
+  Arc arc(10, 60, 0.5);
+  KeyframeGraph graph{KeyframeGraphOptions()};
+  std::vector<GraphBirth> births;
+  for (int k = 0; k < 60; ++k) births.push_back({static_cast<FeatureId>(k + 1), arc.Ray(0, k)});
+  for (int k = 0; k < 10; ++k) {
+    std::vector<GraphSighting> seen;
+    for (int point = 0; k > 0 && point < 60; ++point) {
+      seen.push_back({static_cast<FeatureId>(point + 1), arc.Ray(k, point), kSigma_rad, {}});
+    }
+    graph.Add(arc.poses()[static_cast<std::size_t>(k)], 2.0, seen,
+              k == 0 ? std::span<const GraphBirth>(births) : std::span<const GraphBirth>());
+  }
+  const auto job = graph.MakeJob([](FeatureId) { return std::nullopt; });
+  ASSERT_TRUE(job.has_value());
+  EXPECT_EQ(job->first_recent, 0u) << "all of it is one stretch";
+  EXPECT_EQ(job->distances_m.size(), job->keyframes.size());
+}
+
 TEST(BundleAdjustment, LeavesOutWhatIsBehindACamera) {
   Arc arc(10, 60, 0.5);
   BundleProblem problem = arc.Problem();
