@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
+#include "server/store/annotation_store.hpp"
+
 namespace saccade::testing {
 namespace {
 

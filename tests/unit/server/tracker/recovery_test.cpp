@@ -1,4 +1,5 @@
-// The tracker on a recording whose lens is covered, or whose view jumps.
+// The tracker on a recording, a real one and one of the simulator, whose lens is covered, or whose
+// view jumps.
 #include <gtest/gtest.h>
 
 #include <ctime>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "server/capture/dataset.hpp"
+#include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
 namespace saccade {
@@ -14,16 +16,32 @@ namespace {
 
 using Snapshot = std::shared_ptr<const MapSnapshot>;
 
-/// Frames of a recording, handed out in any order at 30 Hz.
+constexpr std::uint64_t kFrames = 330;
+
+/// Null: it is not here.
+std::unique_ptr<FrameSource> OpenRecorded() {
+  SourceOptions options;
+  options.end_frame = kFrames;
+  auto source = OpenDataset(
+      std::filesystem::path(SACCADE_SOURCE_DIR) / "../shared/data/tum_fr1_xyz", options);
+  return source.ok() ? *std::move(source) : nullptr;
+}
+
+std::unique_ptr<FrameSource> OpenSimulated() {
+  SimOptions options;
+  options.motion = SimMotion::kDesk;
+  options.duration_s = static_cast<double>(kFrames) / options.fps;
+  auto source = SimSource::Open(options);
+  return source.ok() ? *std::move(source) : nullptr;
+}
+
+/// Frames of a recording, handed out in any order at 30 Hz. Nobody knows of a target.
 class Player {
  public:
-  explicit Player(const std::filesystem::path& folder, std::uint64_t end) {
-    SourceOptions options;
-    options.end_frame = end;
-    auto source = OpenDataset(folder, options);
-    if (!source.ok()) return;
-    info_ = (*source)->info();
-    for (auto frame = (*source)->Next(); frame.ok() && *frame; frame = (*source)->Next()) {
+  explicit Player(FrameSource& source) {
+    info_ = source.info();
+    info_.target.reset();
+    for (auto frame = source.Next(); frame.ok() && *frame; frame = source.Next()) {
       frames_.push_back(**frame);
     }
     auto created = Tracker::Create(info_, TrackerOptions());
@@ -60,13 +78,17 @@ class Player {
   Timestamp start_ns_ = 10'000'000'000'000;
 };
 
-class Recovery : public testing::Test {
+struct Place {
+  const char* name;
+  std::unique_ptr<FrameSource> (*open)();
+};
+
+class Recovery : public testing::TestWithParam<Place> {
  protected:
   void SetUp() override {
-    const std::filesystem::path folder =
-        std::filesystem::path(SACCADE_SOURCE_DIR) / "../shared/data/tum_fr1_xyz";
-    if (!std::filesystem::exists(folder)) GTEST_SKIP() << "data set tum_fr1_xyz is not here";
-    player_ = std::make_unique<Player>(folder, 330);
+    const std::unique_ptr<FrameSource> source = GetParam().open();
+    if (source == nullptr) GTEST_SKIP() << GetParam().name << " is not here (../shared/data)";
+    player_ = std::make_unique<Player>(*source);
     ASSERT_TRUE(player_->ready());
     for (std::size_t k = 0; k < 300; ++k) {
       const Snapshot shown = player_->Show(k);
@@ -80,9 +102,9 @@ class Recovery : public testing::Test {
   std::vector<std::uint64_t> revisions_;
 };
 
-TEST_F(Recovery, WhatIsRefinedAllTheTimeIsNoJump) { EXPECT_EQ(revisions_[299], revisions_[60]); }
+TEST_P(Recovery, WhatIsRefinedAllTheTimeIsNoJump) { EXPECT_EQ(revisions_[299], revisions_[60]); }
 
-TEST_F(Recovery, AfterTheViewJumpsBackToAMappedPlace) {
+TEST_P(Recovery, AfterTheViewJumpsBackToAMappedPlace) {
   Snapshot last;
   int tracked_after = -1;
   for (std::size_t k = 0; k < 45; ++k) {
@@ -98,7 +120,7 @@ TEST_F(Recovery, AfterTheViewJumpsBackToAMappedPlace) {
   EXPECT_LT(RotationAngle(last->world_from_camera, poses_[194]), 0.03);
 }
 
-TEST_F(Recovery, AfterTheLensWasCovered) {
+TEST_P(Recovery, AfterTheLensWasCovered) {
   Snapshot last;
   for (int k = 0; k < 40; ++k) last = player_->ShowBlack();
   EXPECT_EQ(last->status, TrackingStatus::kLost);
@@ -111,7 +133,7 @@ TEST_F(Recovery, AfterTheLensWasCovered) {
 }
 
 /// Pause of an hour, of a year (nanoseconds taken for seconds), clock set back by an hour.
-TEST_F(Recovery, AGapInTimeOfWhateverLengthIsANewStartInTheMapAtTheCostOfAFrame) {
+TEST_P(Recovery, AGapInTimeOfWhateverLengthIsANewStartInTheMapAtTheCostOfAFrame) {
   constexpr Timestamp kHour_ns = 3'600'000'000'000;
   std::size_t frame = 275;
   for (const Timestamp by_ns : {kHour_ns, 8760 * kHour_ns, -kHour_ns}) {
@@ -134,7 +156,7 @@ TEST_F(Recovery, AGapInTimeOfWhateverLengthIsANewStartInTheMapAtTheCostOfAFrame)
   }
 }
 
-TEST_F(Recovery, AGapBeforeThereIsAMapStartsAnother) {
+TEST_P(Recovery, AGapBeforeThereIsAMapStartsAnother) {
   player_->tracker().Reset();
   const Snapshot before = player_->Show(100);
   player_->SetClock(3'600'000'000'000);
@@ -144,7 +166,7 @@ TEST_F(Recovery, AGapBeforeThereIsAMapStartsAnother) {
   EXPECT_EQ(last->status, TrackingStatus::kTracking);
 }
 
-TEST_F(Recovery, ShortCoverIsCoastedThrough) {
+TEST_P(Recovery, ShortCoverIsCoastedThrough) {
   Snapshot last;
   for (int k = 0; k < 4; ++k) last = player_->ShowBlack();
   EXPECT_EQ(last->status, TrackingStatus::kCoasting);
@@ -152,7 +174,7 @@ TEST_F(Recovery, ShortCoverIsCoastedThrough) {
   EXPECT_EQ(last->status, TrackingStatus::kTracking);
 }
 
-TEST_F(Recovery, ForeignPicturesAreNeverTakenForTheMap) {
+TEST_P(Recovery, ForeignPicturesAreNeverTakenForTheMap) {
   cv::RNG random(5);
   Snapshot last;
   for (int k = 0; k < 60; ++k) {
@@ -164,7 +186,7 @@ TEST_F(Recovery, ForeignPicturesAreNeverTakenForTheMap) {
   }
 }
 
-TEST_F(Recovery, ResetStartsANewMap) {
+TEST_P(Recovery, ResetStartsANewMap) {
   const Snapshot before = player_->Show(300);
   player_->tracker().Reset();
   const Snapshot after = player_->Show(301);
@@ -175,6 +197,11 @@ TEST_F(Recovery, ResetStartsANewMap) {
   for (std::size_t k = 302; k < 325; ++k) last = player_->Show(k);
   EXPECT_EQ(last->status, TrackingStatus::kTracking);
 }
+
+INSTANTIATE_TEST_SUITE_P(Recordings, Recovery,
+                         testing::Values(Place{"TumFr1Xyz", OpenRecorded},
+                                         Place{"Simulated", OpenSimulated}),
+                         [](const auto& place) { return std::string(place.param.name); });
 
 }  // namespace
 }  // namespace saccade
