@@ -10,7 +10,8 @@ namespace saccade {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-FilterState::FilterState(const FilterOptions& options) : options_(options) {
+FilterState::FilterState(const FilterOptions& options)
+    : options_(options), form_(&ParametrisationOf(options.form)) {
   Reset(CameraMotion(), Matrix12d::Zero());
 }
 
@@ -24,7 +25,7 @@ void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance)
   updates_ = judged_ = 0;
   next_anchor_ = 1;
   noise_scale_ = 1.0;
-  covariance_.Assign(covariance);
+  covariance_.Assign(motion_->InState(covariance));
   readout_s_ = options_.readout_s;
   readout_offset_ = -1;
   if (options_.readout_sigma_s > 0.0) {
@@ -39,11 +40,14 @@ void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covar
   head_ = HeadRate();
   camera_ = camera;
   first_pose_ = camera.world_from_camera;
-  covariance_.ReplaceBlock(0, covariance);
+  covariance_.ReplaceBlock(0, motion_->InState(covariance));
 }
 
 Matrix12d FilterState::CameraCovariance() const {
-  return covariance_.Block(0, 0, kCameraDim, kCameraDim);
+  const int size = motion_->dim();
+  Matrix12d covariance = Matrix12d::Zero();
+  covariance.topLeftCorner(size, size) = covariance_.Block(0, 0, size, size);
+  return covariance;
 }
 
 Matrix6d FilterState::PoseCovariance() const { return covariance_.Block(0, 0, kPoseDim, kPoseDim); }
@@ -68,19 +72,29 @@ const FilterState::Anchor& FilterState::AnchorOf(const Feature& feature) const {
 
 AnchoredPoint FilterState::Point(const Feature& feature, bool first) const {
   const Anchor& anchor = AnchorOf(feature);
-  if (first) {
-    return {anchor.first, feature.first_bearing, feature.first_basis, feature.inverse_range};
-  }
-  return {anchor.pose, feature.bearing, feature.basis, feature.inverse_range};
+  const PointInClone& in_clone = first ? feature.first : feature.point;
+  return {first ? anchor.first : anchor.pose, in_clone.bearing, in_clone.basis,
+          feature.point.inverse_range};
 }
 
 AnchoredPoint FilterState::Point(FeatureId id) const { return Point(*Find(id), false); }
 
-void FilterState::ChangeVelocities(const Eigen::Matrix<double, 6, 1>& by,
-                                   const Matrix6d& covariance) {
-  camera_.velocity_m_s += by.head<3>();
-  camera_.angular_velocity_rad_s += by.tail<3>();
-  covariance_.AddBlock(kPoseDim, covariance);
+FilterState::HeadRate FilterState::RateOf(const HeadMotion& head, double dt) const {
+  Matrix6d turn = Matrix6d::Identity() / dt;
+  turn.topLeftCorner<3, 3>() = camera_.world_from_camera.RotationMatrix() / dt;
+  HeadRate now;
+  now.rate << head.camera_from_next.translation,
+      LogQuaternion(head.camera_from_next.rotation);  // its axis is the same before and after
+  now.rate = (turn * now.rate).eval();
+  now.covariance = turn * head.covariance * turn.transpose();
+  return now;
+}
+
+void FilterState::ChangeVelocities(double sign, const HeadRate& rate) {
+  if (motion_->velocities() < 0) return;
+  camera_.velocity_m_s += sign * rate.rate.head<3>();
+  camera_.angular_velocity_rad_s += sign * rate.rate.tail<3>();
+  covariance_.AddBlock(motion_->velocities(), rate.covariance);
 }
 
 CameraMotion FilterState::WholeMotion() const {
@@ -92,49 +106,39 @@ CameraMotion FilterState::WholeMotion() const {
   return whole;
 }
 
+void FilterState::Follow(const MotionModel::Step& step) {
+  if (mark_) mark_->journal.Add(Journal::Predicted{step.f});
+  covariance_.TransformBlock(0, step.f);
+  covariance_.AddBlock(0, step.q);
+  camera_ = step.next;
+  first_pose_ = camera_.world_from_camera;
+}
+
 void FilterState::Predict(double dt, const MotionNoise& noise, const HeadMotion* head) {
-  const auto rate = [&]() {  // of the joints, seen from the present camera
-    Matrix6d turn = Matrix6d::Identity() / dt;
-    turn.topLeftCorner<3, 3>() = camera_.world_from_camera.RotationMatrix() / dt;
-    HeadRate now;
-    now.rate << head->camera_from_next.translation,
-        LogQuaternion(head->camera_from_next.rotation);  // its axis is the same before and after
-    now.rate = (turn * now.rate).eval();
-    now.covariance = turn * head->covariance * turn.transpose();
-    return now;
-  };
   if (head != nullptr && !head_) {
-    head_ = rate();
-    ChangeVelocities(-head_->rate, head_->covariance);
+    head_ = RateOf(*head, dt);
+    ChangeVelocities(-1.0, *head_);
   } else if (head == nullptr && head_) {
-    ChangeVelocities(head_->rate, head_->covariance);
+    ChangeVelocities(1.0, *head_);
     head_.reset();
   }
   constexpr double kLongestStep_s = 1.0 / 30.0;
   constexpr double kMostSteps = 30.0;  // a second; whoever asks for more knows nothing anyway
   const auto steps =
       static_cast<int>(std::clamp(std::ceil(dt / kLongestStep_s - 0.1), 1.0, kMostSteps));
-  const double step = dt / steps;
   for (int k = 0; k < steps; ++k) {
-    const MotionJacobians jacobians = LineariseMotion(
-        camera_, Fej() ? first_pose_.rotation : camera_.world_from_camera.rotation, step, noise);
-    if (mark_) mark_->journal.Add(Journal::Predicted{jacobians.f});
-    covariance_.TransformBlock(0, jacobians.f);
-    covariance_.AddBlock(0, jacobians.q);
-    camera_ = PropagateMotion(camera_, step);
-    first_pose_ = camera_.world_from_camera;
+    const Eigen::Quaterniond& first =
+        Fej() ? first_pose_.rotation : camera_.world_from_camera.rotation;
+    Follow(motion_->Predict(camera_, first, dt / steps, noise));
   }
   if (head == nullptr) return;
-  head_ = rate();
-  const MotionJacobians jacobians = LineariseHead(camera_, *head);
-  if (mark_) mark_->journal.Add(Journal::Predicted{jacobians.f});
-  covariance_.TransformBlock(0, jacobians.f);
-  covariance_.AddBlock(0, jacobians.q);
-  camera_ = TurnHead(camera_, head->camera_from_next);
-  first_pose_ = camera_.world_from_camera;
+  head_ = RateOf(*head, dt);
+  Follow(motion_->Turn(camera_, *head));
 }
 
-void FilterState::Inflate(const Matrix12d& extra) { covariance_.AddBlock(0, extra); }
+void FilterState::Inflate(const Matrix12d& extra) {
+  covariance_.AddBlock(0, motion_->InState(extra));
+}
 
 AnchorPoseId FilterState::AddAnchor() {
   const Eigen::MatrixXd rows = covariance_.Block(0, 0, kPoseDim, dim());
@@ -176,18 +180,13 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& bi
   Feature feature;
   feature.id = birth.id;
   feature.anchor = anchor;
-  feature.bearing = feature.first_bearing = birth.bearing;
-  feature.basis = feature.first_basis = TangentBasis(birth.bearing);
-  feature.inverse_range = birth.inverse_range;
-  const Eigen::Matrix2d tangent =
-      feature.basis.transpose() * birth.bearing_covariance * feature.basis;
-  const int size = FeatureDim();
-  feature.offset = covariance_.Append(size);
-  if (mark_) mark_->journal.Add(Journal::Appended{size});
+  feature.point = feature.first = {birth.bearing, TangentBasis(birth.bearing), birth.inverse_range};
+  const Eigen::Matrix<double, 3, 2>& basis = feature.point.basis;
+  const Eigen::Matrix2d tangent = basis.transpose() * birth.bearing_covariance * basis;
+  feature.offset = covariance_.Append(form_->dim());
+  if (mark_) mark_->journal.Add(Journal::Appended{form_->dim()});
   feature.birth_covariance = tangent;
-  if (size == 3) covariance_.AddBlock(feature.offset, tangent);
-  covariance_.lower(feature.offset + size - 1, feature.offset + size - 1) =
-      birth.inverse_range_sigma * birth.inverse_range_sigma;
+  covariance_.AddBlock(feature.offset, form_->BirthCovariance(tangent, birth.inverse_range_sigma));
   const auto behind =
       std::upper_bound(features_.begin(), features_.end(), birth.id,
                        [](FeatureId id, const Feature& each) { return id < each.id; });
@@ -200,17 +199,11 @@ bool FilterState::CountErrorsFrom(AnchorPoseId anchor) {
   const auto from = std::find_if(anchors_.begin(), anchors_.end(),
                                  [&](const Anchor& a) { return a.id == anchor; });
   if (from == anchors_.end() || Fej()) return false;
-  // By its error (dr, th) the world has turned by R th about the clone and moved by dr.
-  const Eigen::Matrix3d turn = from->pose.rotation.toRotationMatrix();
   Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(dim(), kPoseDim);
-  const auto move = [&](int offset, const Rigid3& pose) {
-    moved.block<3, 3>(offset, 0).setIdentity();
-    moved.block<3, 3>(offset, 3) = -Skew(pose.translation - from->pose.translation) * turn;
-    moved.block<3, 3>(offset + 3, 3) = pose.rotation.toRotationMatrix().transpose() * turn;
-  };
-  move(0, camera_.world_from_camera);
-  moved.block<3, 3>(6, 3) = -Skew(camera_.velocity_m_s) * turn;
-  for (const Anchor& each : anchors_) move(each.offset, each.pose);
+  motion_->ByOrigin(camera_, from->pose, moved.topRows(motion_->dim()));
+  for (const Anchor& each : anchors_) {
+    PoseByOrigin(each.pose, from->pose, moved.middleRows<kPoseDim>(each.offset));
+  }
   covariance_.Condition(moved, from->offset);
   return true;
 }
@@ -229,7 +222,7 @@ void FilterState::Remove(std::span<const FeatureId> ids) {
   for (const FeatureId id : ids) {
     const Feature* found = Find(id);
     if (found == nullptr) continue;
-    gone.emplace_back(found->offset, FeatureDim());
+    gone.emplace_back(found->offset, form_->dim());
     for (Anchor& anchor : anchors_) anchor.users -= anchor.id == found->anchor ? 1 : 0;
     features_.erase(features_.begin() + (found - features_.data()));
   }
@@ -263,11 +256,10 @@ void FilterState::RemoveRows(const std::vector<std::pair<int, int>>& offset_and_
 
 std::vector<FeatureId> FilterState::RemoveBehind() {
   std::vector<FeatureId> gone;
-  const int last = FeatureDim() - 1;
   for (const Feature& feature : features_) {
-    const int at = feature.offset + last;
+    const int at = feature.offset + form_->range();
     const double sigma = std::sqrt(std::max(0.0, covariance_.at(at, at)));
-    if (feature.inverse_range + 2.0 * sigma < 0.0) gone.push_back(feature.id);
+    if (feature.point.inverse_range + 2.0 * sigma < 0.0) gone.push_back(feature.id);
   }
   Remove(gone);
   return gone;

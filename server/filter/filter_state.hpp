@@ -11,11 +11,13 @@
 #include <span>
 #include <vector>
 
+#include "server/filter/constant_velocity.hpp"
 #include "server/filter/covariance.hpp"
 #include "server/filter/journal.hpp"
 #include "server/filter/motion_model.hpp"
 #include "server/filter/parallax.hpp"
 #include "server/filter/point_model.hpp"
+#include "server/filter/point_parametrisation.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/similarity3.hpp"
 #include "shared/scene/map_snapshot.hpp"
@@ -116,7 +118,6 @@ struct FilterOptions {
 /// and how. Not thread-safe.
 class FilterState {
  public:
-  static constexpr int kCameraDim = 12;
   static constexpr int kPoseDim = 6;
 
   explicit FilterState(const FilterOptions& options);
@@ -230,23 +231,24 @@ class FilterState {
     FeatureId id = 0;
     int offset = 0;
     AnchorPoseId anchor = 0;
-    Eigen::Vector3d bearing, first_bearing;
-    Eigen::Matrix<double, 3, 2> basis, first_basis;
-    double inverse_range = 1.0;
+    PointInClone point, first;
     Eigen::Matrix2d birth_covariance = Eigen::Matrix2d::Zero();  // of the bearing, as first seen
   };
   struct Linearised;  // of all observations: update.cpp
 
   bool Fej() const { return options_.fej || updates_ <= options_.fej_updates; }
-  int FeatureDim() const { return options_.form == PointForm::kBearingRange ? 3 : 1; }
   const Feature* Find(FeatureId id) const;
   const Anchor& AnchorOf(const Feature& feature) const;
   AnchoredPoint Point(const Feature& feature, bool first) const;
   /// Pixel at the current estimates, Jacobians where the options say.
   std::optional<PixelPrediction> Linearise(const CameraModel& camera, const Rigid3& pose,
                                            const Feature& feature) const;
+  /// One step of the camera, whatever moved it.
+  void Follow(const MotionModel::Step& step);
   void RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size);
-  void ChangeVelocities(const Eigen::Matrix<double, 6, 1>& by, const Matrix6d& covariance);
+  struct HeadRate;
+  HeadRate RateOf(const HeadMotion& head, double dt) const;
+  void ChangeVelocities(double sign, const HeadRate& rate);
   absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
                                           std::span<const Observation> observations,
                                           const Rigid3& linearisation,
@@ -294,8 +296,9 @@ class FilterState {
   std::optional<HeadRate> head_;  // none: it was unknown, camera_'s velocities are whole
 
   FilterOptions options_;
+  const PointParametrisation* form_ = &BearingRange();
+  const MotionModel* motion_ = &ConstantVelocity();
   CameraMotion camera_;
-  Eigen::Quaterniond first_rotation_ = Eigen::Quaterniond::Identity();  // of this frame
   Rigid3 first_pose_;
   std::vector<Anchor> anchors_;    // rising ids
   std::vector<Feature> features_;  // rising ids

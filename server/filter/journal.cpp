@@ -22,7 +22,7 @@ VectorXd Apply(const Journal::Updated& update, VectorXd step) {
     if (rows.readout >= 0) sum += rows.d_readout * step[rows.readout];
     if (rows.anchor >= 0) {
       sum += rows.d_anchor * step.segment<kPoseDim>(rows.anchor) +
-             rows.d_point.rightCols(rows.point_dim) * step.segment(rows.point, rows.point_dim);
+             rows.d_point * step.segment(rows.point, rows.d_point.cols());
     }
     seen.segment<2>(2 * static_cast<Eigen::Index>(k)) = sum;
   }
@@ -34,7 +34,8 @@ VectorXd Apply(const Journal::Updated& update, VectorXd step) {
 }
 
 VectorXd Apply(const Journal::Predicted& prediction, VectorXd step) {
-  step.head<12>() = (prediction.f * step.head<12>()).eval();
+  const auto size = prediction.f.rows();
+  step.head(size) = (prediction.f * step.head(size)).eval();
   return step;
 }
 

@@ -4,7 +4,12 @@
 #include <variant>
 #include <vector>
 
+#include "server/filter/motion_model.hpp"
+
 namespace saccade {
+
+/// A pixel's Jacobian by what of a point is in the state.
+using PointColumns = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 3>;
 
 /// What happened to the filter's errors since a mark: enough to carry a correction that is found
 /// late on to the present, as if it had been known at the mark.
@@ -21,15 +26,15 @@ class Journal {
     Eigen::MatrixXd factor;  // m x m, lower triangle; or empty
     /// H e, from an error e (n) to m numbers.
     struct Rows {
-      int anchor = -1, point = -1, point_dim = 0, readout = -1;  // offsets
+      int anchor = -1, point = -1, readout = -1;  // offsets
       Eigen::Matrix<double, 2, 6> d_camera, d_anchor;
-      Eigen::Matrix<double, 2, 3> d_point;
+      PointColumns d_point;
       Eigen::Vector2d d_readout;
     };
     std::vector<Rows> rows;
   };
   struct Predicted {
-    Eigen::Matrix<double, 12, 12> f;  // of the camera
+    MotionModel::Square f;  // of the camera
   };
   struct Cloned {};  // the camera's pose was appended
   struct Appended {

@@ -7,28 +7,25 @@ void FilterState::MoveWorld(const Similarity3& world_from_before) {
   mark_.reset();
   const double scale = world_from_before.scale;
   const Eigen::Matrix3d turn = scale * world_from_before.rotation.toRotationMatrix();
-  Matrix12d by = Matrix12d::Identity();
-  by.topLeftCorner<3, 3>() = by.block<3, 3>(6, 6) = turn;
-  covariance_.TransformBlock(0, by);
+  Matrix6d by = Matrix6d::Identity();  // of a pose
+  by.topLeftCorner<3, 3>() = turn;
+  covariance_.TransformBlock(0, motion_->InMovedWorld(turn));
   camera_.world_from_camera = world_from_before.Move(camera_.world_from_camera);
   camera_.velocity_m_s = turn * camera_.velocity_m_s;
   first_pose_ = world_from_before.Move(first_pose_);
-  first_rotation_ = (world_from_before.rotation * first_rotation_).normalized();
   if (head_) {
     head_->rate.head<3>() = turn * head_->rate.head<3>();
-    head_->covariance = (by.bottomRightCorner<6, 6>() * head_->covariance *
-                         by.bottomRightCorner<6, 6>().transpose())
-                            .eval();
+    head_->covariance = (by * head_->covariance * by.transpose()).eval();
   }
   for (Anchor& anchor : anchors_) {
     anchor.pose = world_from_before.Move(anchor.pose);
     anchor.first = world_from_before.Move(anchor.first);
-    covariance_.TransformBlock(anchor.offset, by.topLeftCorner<6, 6>());
+    covariance_.TransformBlock(anchor.offset, by);
   }
-  const int last = FeatureDim() - 1;
   for (Feature& feature : features_) {
-    feature.inverse_range /= scale;
-    covariance_.TransformBlock(feature.offset + last, Eigen::Matrix<double, 1, 1>(1.0 / scale));
+    feature.point.inverse_range /= scale;
+    covariance_.TransformBlock(feature.offset + form_->range(),
+                               Eigen::Matrix<double, 1, 1>(1.0 / scale));
   }
 }
 

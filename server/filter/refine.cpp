@@ -1,21 +1,10 @@
 // The part of FilterState that takes over better estimates (bundle adjustment).
 #include <algorithm>
-#include <cmath>
 
 #include "server/filter/filter_state.hpp"
 
 namespace saccade {
 namespace {
-
-/// Tangent coordinates that MoveBearing() needs to bring a bearing to `target`.
-Eigen::Vector2d BearingStep(const Eigen::Vector3d& bearing,
-                            const Eigen::Matrix<double, 3, 2>& basis,
-                            const Eigen::Vector3d& target) {
-  const Eigen::Vector3d across = target - bearing.dot(target) * bearing;
-  const double sine = across.norm();
-  if (sine < 1e-12) return Eigen::Vector2d::Zero();
-  return std::atan2(sine, bearing.dot(target)) / sine * (basis.transpose() * across);
-}
 
 Eigen::Matrix<double, 6, 1> PoseStep(const Rigid3& from, const Rigid3& to) {
   Eigen::Matrix<double, 6, 1> step;
@@ -51,22 +40,18 @@ void FilterState::Refine(const Refinement& refinement) {
     moved.world_from_camera = *refinement.world_from_camera;
     moved.velocity_m_s = moved.world_from_camera.rotation *
                          (mark.camera.world_from_camera.rotation.conjugate() * moved.velocity_m_s);
-    step.head<kCameraDim>() = Minus(moved, mark.camera);
+    step.head(motion_->dim()) = motion_->Minus(moved, mark.camera);
   }
   for (const Anchor& anchor : mark.anchors) {
     const auto better = refinement.anchors.find(anchor.id);
     if (better == refinement.anchors.end()) continue;
     step.segment<kPoseDim>(anchor.offset) = PoseStep(anchor.pose, better->second);
   }
-  const int last = FeatureDim() - 1;
   for (const Feature& feature : mark.features) {
     const auto better = refinement.features.find(feature.id);
     if (better == refinement.features.end()) continue;
-    if (FeatureDim() == 3) {
-      step.segment<2>(feature.offset) =
-          BearingStep(feature.bearing, feature.basis, better->second.bearing);
-    }
-    step[feature.offset + last] = better->second.inverse_range - feature.inverse_range;
+    step.segment(feature.offset, form_->dim()) =
+        form_->Minus(better->second.bearing, better->second.inverse_range, feature.point);
   }
   step = mark.journal.Carry(std::move(step));
   mark_.reset();

@@ -14,7 +14,6 @@ std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMot
                                             const Matrix12d& covariance) {
   Reset(camera, covariance);
   updates_ = kMature;
-  const bool with_bearing = FeatureDim() == 3;
   std::vector<int> rows;  // of seed.covariance, in the order of the state
   int first = dim();
   if (readout_offset_ >= 0) {
@@ -35,12 +34,10 @@ std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMot
     Feature feature;
     feature.id = from.id;
     feature.anchor = ids[static_cast<std::size_t>(from.anchor)];
-    feature.bearing = feature.first_bearing = from.bearing;
-    feature.basis = feature.first_basis = TangentBasis(from.bearing);
-    feature.inverse_range = from.inverse_range;
+    feature.point = feature.first = {from.bearing, TangentBasis(from.bearing), from.inverse_range};
     feature.birth_covariance = from.birth_covariance;
-    feature.offset = covariance_.Append(FeatureDim());
-    for (int r = with_bearing ? 0 : 2; r < 3; ++r) {
+    feature.offset = covariance_.Append(form_->dim());
+    for (int r = 3 - form_->dim(); r < 3; ++r) {
       rows.push_back(points + 3 * static_cast<int>(k) + r);
     }
     features_.push_back(feature);

@@ -27,6 +27,11 @@ bool Sudden(double error_s, const MatrixXd& before) {
   return error_s * error_s > kSigmas * kSigmas * variance;
 }
 
+Rigid3 Moved(const Rigid3& pose, const Eigen::Matrix<double, 6, 1>& error) {
+  return {(pose.rotation * ExpQuaternion(error.tail<3>())).normalized(),
+          pose.translation + error.head<3>()};
+}
+
 }  // namespace
 
 /// Sparse measurement model of one frame: two rows an observation, three blocks
@@ -56,15 +61,11 @@ VectorXd FilterState::StepTo(const Rigid3& linearisation) const {
 }
 
 AnchoredPoint FilterState::MovedPoint(const Feature& feature, const VectorXd& step) const {
-  AnchoredPoint point = Point(feature, false);
-  const int at = AnchorOf(feature).offset;
-  point.world_from_anchor.translation += step.segment<3>(at);
-  point.world_from_anchor.rotation =
-      (point.world_from_anchor.rotation * ExpQuaternion(step.segment<3>(at + 3))).normalized();
-  const auto part = step.segment(feature.offset, FeatureDim());
-  if (FeatureDim() == 3) MoveBearing(part.head<2>(), point.bearing, point.basis);
-  point.inverse_range += part[part.size() - 1];
-  return point;
+  const Anchor& anchor = AnchorOf(feature);
+  PointInClone point = feature.point;
+  form_->Move(step.segment(feature.offset, form_->dim()), point);
+  return {Moved(anchor.pose, step.segment<6>(anchor.offset)), point.bearing, point.basis,
+          point.inverse_range};
 }
 
 absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
@@ -95,17 +96,14 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
       }
       rows.anchor = AnchorOf(*feature).offset;
       rows.point = feature->offset;
-      rows.point_dim = FeatureDim();
       if (at) {
         if (!Fej()) {
           at->d_anchor.rightCols<3>() *= RightJacobianSo3(step.segment<3>(rows.anchor + 3)).eval();
         }
         ahead = at->d_anchor * step.segment<6>(rows.anchor) +
-                at->d_point.rightCols(rows.point_dim) * step.segment(rows.point, rows.point_dim);
-        if (rows.point_dim == 1) {
-          const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
-          rows.noise += d_bearing * feature->birth_covariance * d_bearing.transpose();
-        }
+                form_->InState(at->d_point) * step.segment(rows.point, form_->dim());
+        const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
+        rows.noise += d_bearing * form_->Frozen(feature->birth_covariance) * d_bearing.transpose();
       }
     }
     if (!at) {
@@ -115,7 +113,7 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
     rows.d_camera = at->d_camera;
     rows.d_camera.rightCols<3>() = at->d_camera.rightCols<3>() * turn;
     rows.d_anchor = at->d_anchor;
-    rows.d_point = at->d_point;
+    rows.d_point = form_->InState(at->d_point);
     if (readout_offset_ >= 0) ahead += rows.d_readout * step[readout_offset_];
     all.innovation.segment<2>(2 * static_cast<Eigen::Index>(k)) =
         observation.pixel - at->pixel + rows.d_camera * step.head<6>() + ahead;
@@ -142,7 +140,7 @@ std::vector<FilterState::Turned> FilterState::ExplainByTurning(
         {observation.pixel - at->pixel, at->d_camera.rightCols<3>(),
          observation.noise + d_bearing * feature.birth_covariance * d_bearing.transpose()});
     turned[feature.anchor].age = updates_ - AnchorOf(feature).born;
-    turned[feature.anchor].ranges.push_back(feature.offset + FeatureDim() - 1);
+    turned[feature.anchor].ranges.push_back(feature.offset + form_->range());
   }
   std::vector<Turned> all;
   for (auto& [anchor, each] : turned) {
@@ -171,9 +169,8 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, UpdateRe
     if (rows.anchor != copied) covariance_.CopyColumns(rows.anchor, kPoseDim, anchor_columns);
     copied = rows.anchor;
     columns.noalias() += anchor_columns * rows.d_anchor.transpose();
-    covariance_.CopyColumns(rows.point, rows.point_dim, point_columns.leftCols(rows.point_dim));
-    columns.noalias() +=
-        point_columns.leftCols(rows.point_dim) * rows.d_point.rightCols(rows.point_dim).transpose();
+    covariance_.CopyColumns(rows.point, form_->dim(), point_columns.leftCols(form_->dim()));
+    columns.noalias() += point_columns.leftCols(form_->dim()) * rows.d_point.transpose();
   }
   MatrixXd s(m, m);
   for (std::size_t k = 0; k < all.rows.size(); ++k) {
@@ -184,8 +181,7 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, UpdateRe
     if (readout_offset_ >= 0) block.noalias() += rows.d_readout * pht.row(readout_offset_);
     if (rows.anchor >= 0) {
       block.noalias() += rows.d_anchor * pht.middleRows<kPoseDim>(rows.anchor);
-      block.noalias() +=
-          rows.d_point.rightCols(rows.point_dim) * pht.middleRows(rows.point, rows.point_dim);
+      block.noalias() += rows.d_point * pht.middleRows(rows.point, form_->dim());
     }
     s.block<2, 2>(at, at) += rows.noise;
   }
@@ -223,7 +219,7 @@ absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, Upd
     if (readout_offset_ >= 0) h.block<2, 1>(at, readout_offset_) = rows.d_readout;
     if (rows.anchor >= 0) {
       h.block<2, kPoseDim>(at, rows.anchor) = rows.d_anchor;
-      h.block(at, rows.point, 2, rows.point_dim) = rows.d_point.rightCols(rows.point_dim);
+      h.block(at, rows.point, 2, form_->dim()) = rows.d_point;
     }
     const Eigen::Matrix2d weight = rows.noise.inverse();
     weighted.middleRows<2>(at) = weight * h.middleRows<2>(at);
@@ -322,13 +318,12 @@ absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
 
 void FilterState::CarryScale(const VectorXd& step) {
   if (updates_ <= options_.carry_scale_after) return;
-  const int last = FeatureDim() - 1;
   VectorXd w = VectorXd::Zero(dim());
   VectorXd d = VectorXd::Zero(dim());
   double total = 0.0;
   for (const Feature& feature : features_) {
-    const int at = feature.offset + last;
-    const double rho = feature.inverse_range;
+    const int at = feature.offset + form_->range();
+    const double rho = feature.point.inverse_range;
     if (rho < options_.min_inverse_range) continue;
     // Weight by information; w^T N = 1 for the scale direction N = (positions,
     // -rho).
@@ -339,8 +334,7 @@ void FilterState::CarryScale(const VectorXd& step) {
   }
   if (total <= 0.0) return;
   w /= total;
-  d.segment<3>(0) = step.segment<3>(0);
-  d.segment<3>(6) = step.segment<3>(6);
+  d.head(motion_->dim()) = motion_->OfScale(step.head(motion_->dim()));
   if (!Fej()) {
     for (const Anchor& anchor : anchors_) {
       d.segment<3>(anchor.offset) = step.segment<3>(anchor.offset);
@@ -358,20 +352,15 @@ void FilterState::Correct(const VectorXd& error) {
     if (turned.squaredNorm() < kNegligible_rad * kNegligible_rad) return;
     covariance_.TransformBlock(offset, RightJacobianSo3(turned));
   };
-  camera_ = Plus(camera_, error.head<kCameraDim>());
+  camera_ = motion_->Plus(camera_, error.head(motion_->dim()));
   carry(3);
   if (readout_offset_ >= 0) readout_s_ += error[readout_offset_];
   for (Anchor& anchor : anchors_) {
-    anchor.pose.translation += error.segment<3>(anchor.offset);
-    anchor.pose.rotation =
-        (anchor.pose.rotation * ExpQuaternion(error.segment<3>(anchor.offset + 3))).normalized();
+    anchor.pose = Moved(anchor.pose, error.segment<6>(anchor.offset));
     carry(anchor.offset + 3);
   }
-  const bool with_bearing = FeatureDim() == 3;
   for (Feature& feature : features_) {
-    const auto part = error.segment(feature.offset, FeatureDim());
-    if (with_bearing) MoveBearing(part.head<2>(), feature.bearing, feature.basis);
-    feature.inverse_range += part[part.size() - 1];
+    form_->Move(error.segment(feature.offset, form_->dim()), feature.point);
   }
 }
 
