@@ -53,6 +53,11 @@ MotionJacobians LineariseHead(const CameraMotion& camera, const HeadMotion& head
   return result;
 }
 
+Rigid3 PlusPose(const Rigid3& pose, const Eigen::Matrix<double, 6, 1>& error) {
+  return {(pose.rotation * ExpQuaternion(error.tail<3>())).normalized(),
+          pose.translation + error.head<3>()};
+}
+
 void PoseByOrigin(const Rigid3& pose, const Rigid3& origin, Eigen::Ref<Eigen::MatrixXd> rows) {
   const Matrix3d turn = origin.rotation.toRotationMatrix();
   rows.block<3, 3>(0, 0).setIdentity();

@@ -97,6 +97,12 @@ class MotionModel {
   const int dim_, velocities_;
 };
 
+/// A camera that stands still: 6 errors, and no prediction adds to them.
+const MotionModel& StandingStill();
+
+/// `pose` [+] `error` [position (world), rotation (local)].
+Rigid3 PlusPose(const Rigid3& pose, const Eigen::Matrix<double, 6, 1>& error);
+
 /// A pose's errors by those of the pose that the world is counted from, into `rows` (6 x 6, zero):
 /// by its error (dr, th) the world has turned by R th about it and moved by dr.
 void PoseByOrigin(const Rigid3& pose, const Rigid3& origin, Eigen::Ref<Eigen::MatrixXd> rows);
