@@ -25,8 +25,7 @@ int Covariance::Append(int size) {
   const int offset = n_;
   const int needed = n_ + size;
   if (needed > p_.rows()) {
-    // Odd leading dimension (in cache lines): rows of the lower triangle are
-    // read across columns.
+    // Odd leading dimension (in cache lines): rows of the lower triangle are read across columns.
     const int capacity = 2 * needed + (2 * needed % 16 == 0 ? 8 : 0);
     Eigen::MatrixXd bigger = Eigen::MatrixXd::Zero(capacity, capacity);
     bigger.topLeftCorner(n_, n_) = p_.topLeftCorner(n_, n_);
@@ -35,6 +34,11 @@ int Covariance::Append(int size) {
   n_ = needed;
   p_.block(offset, 0, size, needed).setZero();
   return offset;
+}
+
+void Covariance::Append(const Covariance& other) {
+  const int offset = Append(other.n_);
+  p_.block(offset, offset, other.n_, other.n_) = other.p_.topLeftCorner(other.n_, other.n_);
 }
 
 void Covariance::Keep(const std::vector<int>& keep) {

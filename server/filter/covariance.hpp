@@ -22,6 +22,8 @@ class Covariance {
 
   /// Appends `size` rows and columns of zeros; returns their offset.
   int Append(int size);
+  /// Appends all of another, which shares nothing with this one.
+  void Append(const Covariance& other);
   /// Keeps these rows and columns (rising), drops the others.
   void Keep(const std::vector<int>& keep);
   /// P <- P - W W^T with W n x m.

@@ -1,52 +1,105 @@
 #include "server/filter/filter_state.hpp"
 
-#include <absl/strings/str_cat.h>
-
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace saccade {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
-FilterState::FilterState(const FilterOptions& options) : options_(options) {
+FilterState::FilterState(const FilterOptions& options)
+    : options_(options), form_(&ParametrisationOf(options.form)) {
   Reset(CameraMotion(), Matrix12d::Zero());
 }
 
 void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance) {
-  mark_.reset();
-  head_ = HeadRate();
-  camera_ = camera;
-  first_pose_ = camera.world_from_camera;
+  layout_.Clear();
+  islands_.clear();
+  robots_.clear();
   anchors_.clear();
   features_.clear();
-  updates_ = judged_ = 0;
+  next_robot_ = kFirstRobot;
   next_anchor_ = 1;
-  noise_scale_ = 1.0;
-  covariance_.Assign(covariance);
-  readout_s_ = options_.readout_s;
-  readout_offset_ = -1;
-  if (options_.readout_sigma_s > 0.0) {
-    readout_offset_ = covariance_.Append(1);
-    covariance_.lower(readout_offset_, readout_offset_) =
-        options_.readout_sigma_s * options_.readout_sigma_s;
+  AddRobot(camera, covariance,
+           {.readout_s = options_.readout_s, .readout_sigma_s = options_.readout_sigma_s});
+}
+
+RobotId FilterState::AddRobot(const CameraMotion& camera, const Matrix12d& covariance,
+                              const RobotOptions& options) {
+  const int island = layout_.AddIsland();
+  islands_.resize(static_cast<std::size_t>(layout_.islands()));
+  IslandAt(island) = Island();
+  Robot robot;
+  robot.id = next_robot_++;
+  robot.model = options.motion;
+  const bool moves = robot.model->velocities() >= 0;
+  robot.block = Append(moves ? BlockKind::kRobot : BlockKind::kCamera, robot.model->dim(), island);
+  robot.readout_s = options.readout_s;
+  if (options.readout_sigma_s > 0.0) {
+    robot.readout = Append(BlockKind::kReadout, 1, island);
+    const double variance = options.readout_sigma_s * options.readout_sigma_s;
+    IslandAt(island).p.AddBlock(At(robot.readout), Eigen::Matrix<double, 1, 1>(variance));
   }
+  robots_.push_back(robot);
+  ResetCamera(camera, covariance, robot.id);
+  return robot.id;
 }
 
-void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covariance) {
-  mark_.reset();
-  head_ = HeadRate();
-  camera_ = camera;
-  first_pose_ = camera.world_from_camera;
-  covariance_.ReplaceBlock(0, covariance);
+void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covariance, RobotId id) {
+  Robot& robot = Of(id);
+  Island& island = IslandAt(IslandOf(robot.block));
+  island.mark.reset();
+  robot.head = HeadRate();
+  robot.motion = camera;
+  robot.first_pose = camera.world_from_camera;
+  island.p.ReplaceBlock(At(robot.block), robot.model->InState(covariance));
 }
 
-Matrix12d FilterState::CameraCovariance() const {
-  return covariance_.Block(0, 0, kCameraDim, kCameraDim);
+void FilterState::RemoveRobot(RobotId id) {
+  if (id == kFirstRobot || !HasRobot(id)) return;
+  const Robot& robot = Of(id);
+  std::vector<BlockId> gone = {robot.block};
+  if (robot.readout != kNoBlock) gone.push_back(robot.readout);
+  IslandAt(IslandOf(robot.block)).mark.reset();
+  RemoveBlocks(gone);
+  std::erase_if(robots_, [&](const Robot& each) { return each.id == id; });
 }
 
-Matrix6d FilterState::PoseCovariance() const { return covariance_.Block(0, 0, kPoseDim, kPoseDim); }
+FilterState::Robot& FilterState::Of(RobotId id) {
+  return *std::ranges::lower_bound(robots_, id, {}, &Robot::id);
+}
+
+const FilterState::Robot& FilterState::Of(RobotId id) const {
+  return *std::ranges::lower_bound(robots_, id, {}, &Robot::id);
+}
+
+bool FilterState::HasRobot(RobotId id) const {
+  return std::ranges::binary_search(robots_, id, {}, &Robot::id);
+}
+
+Matrix12d FilterState::CameraCovariance(RobotId id) const {
+  const Robot& robot = Of(id);
+  const int at = At(robot.block), size = robot.model->dim();
+  Matrix12d covariance = Matrix12d::Zero();
+  covariance.topLeftCorner(size, size) =
+      IslandAt(IslandOf(robot.block)).p.Block(at, at, size, size);
+  return covariance;
+}
+
+Matrix6d FilterState::PoseCovariance(RobotId id) const {
+  const BlockId block = Of(id).block;
+  return IslandAt(IslandOf(block)).p.Block(At(block), At(block), kPoseDim, kPoseDim);
+}
+
+Eigen::MatrixXd FilterState::FullCovariance() const {
+  Eigen::MatrixXd full = Eigen::MatrixXd::Zero(dim(), dim());
+  int at = 0;
+  for (const Island& island : islands_) {
+    const int size = island.p.dim();
+    full.block(at, at, size, size) = island.p.Full();
+    at += size;
+  }
+  return full;
+}
 
 std::vector<FeatureId> FilterState::FeatureIds() const {
   std::vector<FeatureId> ids;
@@ -56,221 +109,19 @@ std::vector<FeatureId> FilterState::FeatureIds() const {
 }
 
 const FilterState::Feature* FilterState::Find(FeatureId id) const {
-  const auto at = std::lower_bound(features_.begin(), features_.end(), id,
-                                   [](const Feature& f, FeatureId key) { return f.id < key; });
+  const auto at = std::ranges::lower_bound(features_, id, {}, &Feature::id);
   return at != features_.end() && at->id == id ? &*at : nullptr;
 }
 
-const FilterState::Anchor& FilterState::AnchorOf(const Feature& feature) const {
-  return *std::lower_bound(anchors_.begin(), anchors_.end(), feature.anchor,
-                           [](const Anchor& a, AnchorPoseId key) { return a.id < key; });
+const FilterState::Anchor* FilterState::FindAnchor(AnchorPoseId id) const {
+  const auto at = std::ranges::lower_bound(anchors_, id, {}, &Anchor::id);
+  return at != anchors_.end() && at->id == id ? &*at : nullptr;
 }
 
-AnchoredPoint FilterState::Point(const Feature& feature, bool first) const {
-  const Anchor& anchor = AnchorOf(feature);
-  if (first) {
-    return {anchor.first, feature.first_bearing, feature.first_basis, feature.inverse_range};
-  }
-  return {anchor.pose, feature.bearing, feature.basis, feature.inverse_range};
-}
-
-AnchoredPoint FilterState::Point(FeatureId id) const { return Point(*Find(id), false); }
-
-void FilterState::ChangeVelocities(const Eigen::Matrix<double, 6, 1>& by,
-                                   const Matrix6d& covariance) {
-  camera_.velocity_m_s += by.head<3>();
-  camera_.angular_velocity_rad_s += by.tail<3>();
-  covariance_.AddBlock(kPoseDim, covariance);
-}
-
-CameraMotion FilterState::WholeMotion() const {
-  CameraMotion whole = camera_;
-  if (head_) {
-    whole.velocity_m_s += head_->rate.head<3>();
-    whole.angular_velocity_rad_s += head_->rate.tail<3>();
-  }
-  return whole;
-}
-
-void FilterState::Predict(double dt, const MotionNoise& noise, const HeadMotion* head) {
-  const auto rate = [&]() {  // of the joints, seen from the present camera
-    Matrix6d turn = Matrix6d::Identity() / dt;
-    turn.topLeftCorner<3, 3>() = camera_.world_from_camera.RotationMatrix() / dt;
-    HeadRate now;
-    now.rate << head->camera_from_next.translation,
-        LogQuaternion(head->camera_from_next.rotation);  // its axis is the same before and after
-    now.rate = (turn * now.rate).eval();
-    now.covariance = turn * head->covariance * turn.transpose();
-    return now;
-  };
-  if (head != nullptr && !head_) {
-    head_ = rate();
-    ChangeVelocities(-head_->rate, head_->covariance);
-  } else if (head == nullptr && head_) {
-    ChangeVelocities(head_->rate, head_->covariance);
-    head_.reset();
-  }
-  constexpr double kLongestStep_s = 1.0 / 30.0;
-  constexpr double kMostSteps = 30.0;  // a second; whoever asks for more knows nothing anyway
-  const auto steps =
-      static_cast<int>(std::clamp(std::ceil(dt / kLongestStep_s - 0.1), 1.0, kMostSteps));
-  const double step = dt / steps;
-  for (int k = 0; k < steps; ++k) {
-    const MotionJacobians jacobians = LineariseMotion(
-        camera_, Fej() ? first_pose_.rotation : camera_.world_from_camera.rotation, step, noise);
-    if (mark_) mark_->journal.Add(Journal::Predicted{jacobians.f});
-    covariance_.TransformBlock(0, jacobians.f);
-    covariance_.AddBlock(0, jacobians.q);
-    camera_ = PropagateMotion(camera_, step);
-    first_pose_ = camera_.world_from_camera;
-  }
-  if (head == nullptr) return;
-  head_ = rate();
-  const MotionJacobians jacobians = LineariseHead(camera_, *head);
-  if (mark_) mark_->journal.Add(Journal::Predicted{jacobians.f});
-  covariance_.TransformBlock(0, jacobians.f);
-  covariance_.AddBlock(0, jacobians.q);
-  camera_ = TurnHead(camera_, head->camera_from_next);
-  first_pose_ = camera_.world_from_camera;
-}
-
-void FilterState::Inflate(const Matrix12d& extra) { covariance_.AddBlock(0, extra); }
-
-AnchorPoseId FilterState::AddAnchor() {
-  const Eigen::MatrixXd rows = covariance_.Block(0, 0, kPoseDim, dim());
-  const int offset = covariance_.Append(kPoseDim);
-  if (mark_) mark_->journal.Add(Journal::Cloned{});
-  for (int c = 0; c < offset; ++c) {
-    for (int r = 0; r < kPoseDim; ++r) covariance_.lower(offset + r, c) = rows(r, c);
-  }
-  covariance_.AddBlock(offset, rows.leftCols(kPoseDim));
-  anchors_.push_back({next_anchor_, offset, 0, updates_, camera_.world_from_camera, first_pose_});
-  return next_anchor_++;
-}
-
-AnchorPoseId FilterState::AddAnchor(const Rigid3& world_from_camera, const Matrix6d& covariance) {
-  const int offset = covariance_.Append(kPoseDim);
-  if (mark_) mark_->journal.Add(Journal::Appended{kPoseDim});
-  covariance_.AddBlock(offset, covariance);
-  // Not young: its features have been measured often.
-  anchors_.push_back({next_anchor_, offset, 0, 0, world_from_camera, world_from_camera});
-  return next_anchor_++;
-}
-
-absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& birth) {
-  const auto at = std::find_if(anchors_.begin(), anchors_.end(),
-                               [&](const Anchor& a) { return a.id == anchor; });
-  if (at == anchors_.end()) {
-    return absl::InvalidArgumentError(absl::StrCat("filter: no pose clone ", anchor));
-  }
-  if (Has(birth.id)) {
-    return absl::InvalidArgumentError(absl::StrCat("filter: feature id ", birth.id, " is taken"));
-  }
-  if (!(birth.inverse_range >= 0.0) || !(birth.inverse_range_sigma > 0.0) ||
-      !std::isfinite(birth.inverse_range_sigma) || !birth.bearing.allFinite() ||
-      std::abs(birth.bearing.norm() - 1.0) > 1e-6 || !birth.bearing_covariance.allFinite()) {
-    return absl::InvalidArgumentError(
-        "filter: a feature needs a unit bearing, inverse range >= 0 and its "
-        "sigma above 0");
-  }
-  Feature feature;
-  feature.id = birth.id;
-  feature.anchor = anchor;
-  feature.bearing = feature.first_bearing = birth.bearing;
-  feature.basis = feature.first_basis = TangentBasis(birth.bearing);
-  feature.inverse_range = birth.inverse_range;
-  const Eigen::Matrix2d tangent =
-      feature.basis.transpose() * birth.bearing_covariance * feature.basis;
-  const int size = FeatureDim();
-  feature.offset = covariance_.Append(size);
-  if (mark_) mark_->journal.Add(Journal::Appended{size});
-  feature.birth_covariance = tangent;
-  if (size == 3) covariance_.AddBlock(feature.offset, tangent);
-  covariance_.lower(feature.offset + size - 1, feature.offset + size - 1) =
-      birth.inverse_range_sigma * birth.inverse_range_sigma;
-  const auto behind =
-      std::upper_bound(features_.begin(), features_.end(), birth.id,
-                       [](FeatureId id, const Feature& each) { return id < each.id; });
-  features_.insert(behind, feature);
-  ++at->users;
-  return absl::OkStatus();
-}
-
-bool FilterState::CountErrorsFrom(AnchorPoseId anchor) {
-  const auto from = std::find_if(anchors_.begin(), anchors_.end(),
-                                 [&](const Anchor& a) { return a.id == anchor; });
-  if (from == anchors_.end() || Fej()) return false;
-  // By its error (dr, th) the world has turned by R th about the clone and moved by dr.
-  const Eigen::Matrix3d turn = from->pose.rotation.toRotationMatrix();
-  Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(dim(), kPoseDim);
-  const auto move = [&](int offset, const Rigid3& pose) {
-    moved.block<3, 3>(offset, 0).setIdentity();
-    moved.block<3, 3>(offset, 3) = -Skew(pose.translation - from->pose.translation) * turn;
-    moved.block<3, 3>(offset + 3, 3) = pose.rotation.toRotationMatrix().transpose() * turn;
-  };
-  move(0, camera_.world_from_camera);
-  moved.block<3, 3>(6, 3) = -Skew(camera_.velocity_m_s) * turn;
-  for (const Anchor& each : anchors_) move(each.offset, each.pose);
-  covariance_.Condition(moved, from->offset);
-  return true;
-}
-
-double FilterState::DirectionSigma(AnchorPoseId anchor) const {
-  const auto at = std::find_if(anchors_.begin(), anchors_.end(),
-                               [&](const Anchor& each) { return each.id == anchor; });
-  if (at == anchors_.end()) return 0.0;
-  double variance = 0.0;
-  for (int k = 3; k < kPoseDim; ++k) variance += covariance_.at(at->offset + k, at->offset + k);
-  return std::sqrt(std::max(0.0, variance / 3.0));
-}
-
-void FilterState::Remove(std::span<const FeatureId> ids) {
-  std::vector<std::pair<int, int>> gone;
-  for (const FeatureId id : ids) {
-    const Feature* found = Find(id);
-    if (found == nullptr) continue;
-    gone.emplace_back(found->offset, FeatureDim());
-    for (Anchor& anchor : anchors_) anchor.users -= anchor.id == found->anchor ? 1 : 0;
-    features_.erase(features_.begin() + (found - features_.data()));
-  }
-  for (auto anchor = anchors_.begin(); anchor != anchors_.end();) {
-    if (anchor->users > 0) {
-      ++anchor;
-      continue;
-    }
-    gone.emplace_back(anchor->offset, kPoseDim);
-    anchor = anchors_.erase(anchor);
-  }
-  if (!gone.empty()) RemoveRows(gone);
-}
-
-void FilterState::RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size) {
-  std::vector<char> dropped(dim(), 0);
-  for (const auto& [offset, size] : offset_and_size) {
-    std::fill_n(dropped.begin() + offset, size, char{1});
-  }
-  std::vector<int> keep, moved(dim(), 0);
-  keep.reserve(dim());
-  for (int k = 0; k < dim(); ++k) {
-    moved[k] = static_cast<int>(keep.size());
-    if (!dropped[k]) keep.push_back(k);
-  }
-  covariance_.Keep(keep);
-  if (mark_) mark_->journal.Add(Journal::Kept{keep});
-  for (Anchor& anchor : anchors_) anchor.offset = moved[anchor.offset];
-  for (Feature& feature : features_) feature.offset = moved[feature.offset];
-}
-
-std::vector<FeatureId> FilterState::RemoveBehind() {
-  std::vector<FeatureId> gone;
-  const int last = FeatureDim() - 1;
-  for (const Feature& feature : features_) {
-    const int at = feature.offset + last;
-    const double sigma = std::sqrt(std::max(0.0, covariance_.at(at, at)));
-    if (feature.inverse_range + 2.0 * sigma < 0.0) gone.push_back(feature.id);
-  }
-  Remove(gone);
-  return gone;
+std::optional<Rigid3> FilterState::AnchorPose(AnchorPoseId id) const {
+  const Anchor* anchor = FindAnchor(id);
+  if (anchor == nullptr) return std::nullopt;
+  return anchor->pose;
 }
 
 }  // namespace saccade

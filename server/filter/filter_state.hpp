@@ -4,127 +4,49 @@
 #include <absl/status/statusor.h>
 
 #include <Eigen/Dense>
-#include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <vector>
 
 #include "server/filter/covariance.hpp"
+#include "server/filter/filter_types.hpp"
 #include "server/filter/journal.hpp"
-#include "server/filter/motion_model.hpp"
 #include "server/filter/parallax.hpp"
-#include "server/filter/point_model.hpp"
+#include "server/filter/point_parametrisation.hpp"
+#include "server/filter/state_layout.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/similarity3.hpp"
-#include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
 
-using AnchorPoseId = std::uint32_t;
-
-/// A feature as it enters the state: seen at `bearing` from a pose clone.
-struct FeatureBirth {
-  FeatureId id = 0;
-  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();            // unit, in the clone
-  Eigen::Matrix3d bearing_covariance = Eigen::Matrix3d::Zero();  // of the bearing
-  double inverse_range = 1.0;                                    // [1/m]
-  double inverse_range_sigma = 0.5;                              // [1/m]
-};
-
-/// One matched pixel: of a feature, or of a point that is known and therefore outside the state.
-struct Observation {
-  FeatureId id = 0;
-  std::optional<Eigen::Vector3d> known_point;  // [m, world]; then `id` is not looked at
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();  // R [px^2]
-  /// d pixel / d read-out time [px/s]; `pixel` is corrected with the filter's present read-out.
-  Eigen::Vector2d d_readout = Eigen::Vector2d::Zero();
-};
-
-/// What a prediction's errors look like: z - h = -noise, split by where it comes from.
-struct PredictedPixel {
-  PixelPrediction at;          // linearised at the filter's camera pose
-  Eigen::Matrix2d covariance;  // H P H^T [px^2], without measurement noise
-  /// Cov(H error, camera pose error) [position, rotation].
-  Eigen::Matrix<double, 2, 6> with_camera;
-};
-
-struct FeatureMarginal {
-  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
-  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // [m^2]
-  Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // cross terms included [m^2]
-  double inverse_range = 0.0, inverse_range_sigma = 0.0;           // from the anchor [1/m]
-};
-
-struct UpdateReport {
-  int rows = 0;
-  double nis = 0.0;  // r^T S^-1 r, of `rows` degrees of freedom
-};
-
-/// Estimates that are better than the filter's were at its mark.
-struct Refinement {
-  struct Feature {
-    Eigen::Vector3d bearing;  // unit, in its clone
-    double inverse_range;     // [1/m]
-  };
-  std::map<AnchorPoseId, Rigid3> anchors;
-  std::map<FeatureId, Feature> features;
-  std::optional<Rigid3> world_from_camera;  // at the mark
-};
-
-/// A map that was found elsewhere, from the same pictures, for an empty filter.
-struct MapSeed {
-  struct Feature {
-    FeatureId id = 0;                                            // rising
-    int anchor = 0;                                              // index into `anchors`
-    Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();          // unit, in the anchor
-    Eigen::Matrix2d birth_covariance = Eigen::Matrix2d::Zero();  // of one match there [rad^2]
-    double inverse_range = 1.0;                                  // [1/m]
-  };
-  std::vector<Rigid3> anchors;  // world from camera, in order of time
-  std::vector<Feature> features;
-  double readout_s = 0.0;
-  /// Of [read-out | 6 of each anchor | 3 of each feature, tangent by TangentBasis].
-  Eigen::MatrixXd covariance;
-};
-
-struct FilterOptions {
-  /// Jacobians at first estimates (slam-spec 1): always, or for the first updates of a map, while
-  /// the present ones still jump. docs/derivations/first-estimates.md.
-  bool fej = false;
-  int fej_updates = 60;
-  PointForm form = PointForm::kBearingRange;
-  /// Read-out time of a rolling shutter, first to last row [s], and how sure that is; sigma 0: as
-  /// given, not estimated.
-  double readout_s = 0.0;
-  double readout_sigma_s = 0.0;
-  /// Updates after which a change of scale is kept unobserved (docs/derivations/scale.md); before,
-  /// the first depths are still being sorted out.
-  int carry_scale_after = 60;
-  /// Inverse ranges whose clone's matches a turn alone explains to within this many standard
-  /// deviations are left as they are (docs/derivations/parallax.md); 0: always corrected.
-  double parallax_sigmas = 3.0;
-  double min_inverse_range = 1e-4;  // [1/m]; of points given in metres (the state may pass 0)
-};
-
-/// State and covariance of one moving camera and its map (slam-spec 1, 2, 5.4).
+/// State and joint covariance of cameras, moving (robots) or not, and what they see (slam-spec 1,
+/// 2, 5.4, 11).
 ///
-/// x = [camera 12 | read-out 1, if estimated | pose clones 6 each and features 3 or 1 each, as they
-/// were born]. The covariance is private: docs/derivations/state.md lists the calls that change it,
-/// and how. Not thread-safe.
+/// Blocks: each robot as its motion model has it, its read-out time, if estimated; pose clones 6
+/// each and features 3 or 1 each, as they were born. What shares no knowledge stands in islands
+/// apart, which cost and do what filters of their own would; a robot that sees another's feature
+/// joins the two. Calls without a robot mean the first. The covariance is private:
+/// docs/derivations/state.md lists the calls that change it, and how. Not thread-safe.
 class FilterState {
  public:
-  static constexpr int kCameraDim = 12;
   static constexpr int kPoseDim = 6;
 
   explicit FilterState(const FilterOptions& options);
 
-  /// Forgets everything; the camera is at `camera`, known to `covariance` (12 x 12).
+  /// Forgets everything, further robots, too; the camera is at `camera`, known to `covariance`.
   void Reset(const CameraMotion& camera, const Matrix12d& covariance);
   /// Puts the camera elsewhere, without knowledge shared with the map (slam-spec 6).
-  void ResetCamera(const CameraMotion& camera, const Matrix12d& covariance);
+  void ResetCamera(const CameraMotion& camera, const Matrix12d& covariance,
+                   RobotId robot = kFirstRobot);
+
+  /// A further robot, or a camera that stands still; it shares nothing with the rest yet.
+  RobotId AddRobot(const CameraMotion& camera, const Matrix12d& covariance,
+                   const RobotOptions& options = RobotOptions());
+  /// A robot leaves; what it has found stays. The first one, and an unknown one: nothing is done.
+  void RemoveRobot(RobotId robot);
+  bool HasRobot(RobotId robot) const;
 
   /// Forgets everything and takes a map over, as one whose first troubles are behind it; the camera
   /// shares no knowledge with it yet. Ids of the clones, in the order of `seed.anchors`.
@@ -132,15 +54,18 @@ class FilterState {
                                  const Matrix12d& covariance);
 
   const FilterOptions& options() const { return options_; }
-  int dim() const { return covariance_.dim(); }
-  const CameraMotion& camera() const { return camera_; }
-  Matrix12d CameraCovariance() const;
-  Matrix6d PoseCovariance() const;  // [position (world), rotation (local)]
-  /// Copy of the whole covariance, for tests and evaluation.
-  Eigen::MatrixXd FullCovariance() const { return covariance_.Full(); }
-
+  int dim() const { return layout_.dim(); }
+  const StateLayout& layout() const { return layout_; }
+  /// Of a robot, which must exist, as wherever one is named below.
+  const CameraMotion& camera(RobotId robot = kFirstRobot) const { return Of(robot).motion; }
+  Matrix12d CameraCovariance(RobotId robot = kFirstRobot) const;
+  Matrix6d PoseCovariance(RobotId robot = kFirstRobot) const;  // [position (world), rotation]
+  /// camera(), with velocities that include what the joints do.
+  CameraMotion WholeMotion(RobotId robot = kFirstRobot) const;
   /// Read-out time of the rolling shutter as it stands [s]; 0: global shutter.
-  double readout_s() const { return readout_s_; }
+  double readout_s(RobotId robot = kFirstRobot) const { return Of(robot).readout_s; }
+  /// Copy of the whole covariance, island by island, for tests and evaluation.
+  Eigen::MatrixXd FullCovariance() const;
 
   std::size_t feature_count() const { return features_.size(); }
   std::size_t anchor_count() const { return anchors_.size(); }
@@ -148,68 +73,75 @@ class FilterState {
   std::vector<FeatureId> FeatureIds() const;
   /// The feature as it stands. `id` must exist.
   AnchoredPoint Point(FeatureId id) const;
-  FeatureMarginal Marginal(FeatureId id) const;
+  /// `covariance_in_camera` is that of `robot`.
+  FeatureMarginal Marginal(FeatureId id, RobotId robot = kFirstRobot) const;
 
   /// Carries the camera `dt` seconds on, in steps of at most 1/30 s up to a second, and in 30 steps
-  /// beyond: the cost does not grow with a gap. `head`: what its joints did in
-  /// these `dt` seconds, if that is known; then camera()'s velocities are the wearer's alone
+  /// beyond: the cost does not grow with a gap. `head`: what its joints did in these `dt` seconds,
+  /// if that is known; then camera()'s velocities are the wearer's alone
   /// (docs/derivations/prediction.md). Velocities given to Reset() and ResetCamera() are the
-  /// wearer's wherever the head is known.
-  void Predict(double dt, const MotionNoise& noise, const HeadMotion* head = nullptr);
-  /// camera(), with velocities that include what the joints do.
-  CameraMotion WholeMotion() const;
+  /// wearer's wherever the head is known. Other robots stay where they are.
+  void Predict(double dt, const MotionNoise& noise, const HeadMotion* head = nullptr,
+               RobotId robot = kFirstRobot);
   /// Widens what is known of the camera's pose and velocities by P += `extra`.
-  void Inflate(const Matrix12d& extra);
+  void Inflate(const Matrix12d& extra, RobotId robot = kFirstRobot);
 
   /// Clones the camera's pose into the state, fully correlated.
-  AnchorPoseId AddAnchor();
+  AnchorPoseId AddAnchor(RobotId robot = kFirstRobot);
   /// Puts a pose into the state that a camera once had and that is known from elsewhere, with an
-  /// error of its own: covariance (6 x 6) of [position (world), rotation (local)].
-  AnchorPoseId AddAnchor(const Rigid3& world_from_camera, const Matrix6d& covariance);
+  /// error of its own: covariance (6 x 6) of [position (world), rotation (local)]. It enters the
+  /// island of `robot`.
+  AnchorPoseId AddAnchor(const Rigid3& world_from_camera, const Matrix6d& covariance,
+                         RobotId robot = kFirstRobot);
   /// Starts a feature in a clone. InvalidArgument: unknown anchor, id taken, numbers not usable.
   absl::Status AddFeature(AnchorPoseId anchor, const FeatureBirth& birth);
   /// Removes features (unknown ids are ignored), and the clones that then carry none.
   void Remove(std::span<const FeatureId> ids);
 
   /// Pixel of a feature at the current camera pose, with its uncertainty; nothing if not in view.
-  std::optional<PredictedPixel> Predicted(const CameraModel& camera, FeatureId id) const;
+  std::optional<PredictedPixel> Predicted(const CameraModel& camera, FeatureId id,
+                                          RobotId robot = kFirstRobot) const;
   std::optional<PredictedPixel> Predicted(const CameraModel& camera,
-                                          const Eigen::Vector3d& known_point) const;
+                                          const Eigen::Vector3d& known_point,
+                                          RobotId robot = kFirstRobot) const;
 
-  /// Corrects everything with the observations of one frame (joint update, slam-spec 2).
+  /// Corrects everything that shares knowledge with `robot` with the observations of one frame of
+  /// its (joint update, slam-spec 2). Islands of which it sees features are joined with its own.
   ///
-  /// n = dim(), m = 2 * observations.size(): O(n^2 m). Measurements are linearised at
+  /// n = rows of its island, m = 2 * observations.size(): O(n^2 m). Measurements are linearised at
   /// `linearisation`, which may be a better pose than the predicted one (iterated update with that
   /// as its only iterate). Uses the information form when m > n. On error nothing changes:
-  ///   InvalidArgument     unknown feature, or one not in view from `linearisation`
+  ///   InvalidArgument     unknown robot or feature, or one not in view from `linearisation`
   ///   FailedPrecondition  innovation covariance not positive definite
   absl::StatusOr<UpdateReport> Update(const CameraModel& camera,
                                       std::span<const Observation> observations,
-                                      const Rigid3& linearisation);
+                                      const Rigid3& linearisation, RobotId robot = kFirstRobot);
 
   /// The clone that a feature hangs on. `id` must exist.
   AnchorPoseId AnchorOf(FeatureId id) const { return Find(id)->anchor; }
   /// Nothing if it is not in the state any more.
   std::optional<Rigid3> AnchorPose(AnchorPoseId id) const;
-  /// Remembers the present estimates, and from now on what happens to their errors.
-  void Mark();
-  void DropMark();
+  /// Remembers the present estimates of a robot's island, and from now on what happens to their
+  /// errors, until the island is joined with another.
+  void Mark(RobotId robot = kFirstRobot);
+  void DropMark(RobotId robot = kFirstRobot);
   /// Moves the estimates of the mark to better ones, found elsewhere from the same measurements
   /// (docs/derivations/bundle-adjustment.md), and the present ones to where they would be had that
   /// been known then. The covariance is carried along, neither smaller nor larger. Ends the mark;
   /// does nothing without one.
-  void Refine(const Refinement& refinement);
+  void Refine(const Refinement& refinement, RobotId robot = kFirstRobot);
 
   /// From here on errors are counted from this clone: its pose defines the world, and has no error
   /// (docs/derivations/gauge.md; Baarda's S-transformation). Estimates stay, and so does every
-  /// uncertainty of one thing seen from another. False, and nothing is done: the clone is unknown,
-  /// or Jacobians are at first estimates, which learn nothing of where the world is. O(n^2).
+  /// uncertainty of one thing seen from another. Of its island alone. False, and nothing is done:
+  /// the clone is unknown, or Jacobians are at first estimates, which learn nothing of where the
+  /// world is. O(n^2).
   bool CountErrorsFrom(AnchorPoseId anchor);
 
-  /// Everything is somewhere else in a world that is turned, moved and of another scale: the same
-  /// state in other coordinates, to the last correlation (docs/derivations/gauge.md). Ends the
-  /// mark. O(n^2).
-  void MoveWorld(const Similarity3& world_from_before);
+  /// Everything in the robot's island is somewhere else in a world that is turned, moved and of
+  /// another scale: the same state in other coordinates, to the last correlation
+  /// (docs/derivations/gauge.md). Ends the mark. O(n^2).
+  void MoveWorld(const Similarity3& world_from_before, RobotId robot = kFirstRobot);
 
   /// How surely a clone's direction is known from where errors are counted [rad]; unknown: 0.
   double DirectionSigma(AnchorPoseId anchor) const;
@@ -218,9 +150,25 @@ class FilterState {
   std::vector<FeatureId> RemoveBehind();
 
  private:
+  /// The joints' own part of a camera's velocities.
+  struct HeadRate {
+    Eigen::Matrix<double, 6, 1> rate = Eigen::Matrix<double, 6, 1>::Zero();
+    Matrix6d covariance = Matrix6d::Zero();
+  };
+  struct Robot {
+    RobotId id = kFirstRobot;
+    BlockId block = kNoBlock, readout = kNoBlock;
+    const MotionModel* model = &ConstantVelocity();
+    CameraMotion motion;
+    Rigid3 first_pose;
+    std::optional<HeadRate> head;  // that motion is without; none: it was unknown
+    double readout_s = 0.0;
+    int judged = 0;            // updates that told of the noise
+    double noise_scale = 1.0;  // of matches' errors against their R, squared; up to 1
+  };
   struct Anchor {
     AnchorPoseId id = 0;
-    int offset = 0;
+    BlockId block = kNoBlock;
     int users = 0;
     int born = 0;  // updates before it
     Rigid3 pose;
@@ -228,83 +176,124 @@ class FilterState {
   };
   struct Feature {
     FeatureId id = 0;
-    int offset = 0;
+    BlockId block = kNoBlock;
     AnchorPoseId anchor = 0;
-    Eigen::Vector3d bearing, first_bearing;
-    Eigen::Matrix<double, 3, 2> basis, first_basis;
-    double inverse_range = 1.0;
+    PointInClone point, first;
     Eigen::Matrix2d birth_covariance = Eigen::Matrix2d::Zero();  // of the bearing, as first seen
   };
-  struct Linearised;  // of all observations: update.cpp
-
-  bool Fej() const { return options_.fej || updates_ <= options_.fej_updates; }
-  int FeatureDim() const { return options_.form == PointForm::kBearingRange ? 3 : 1; }
-  const Feature* Find(FeatureId id) const;
-  const Anchor& AnchorOf(const Feature& feature) const;
-  AnchoredPoint Point(const Feature& feature, bool first) const;
-  /// Pixel at the current estimates, Jacobians where the options say.
-  std::optional<PixelPrediction> Linearise(const CameraModel& camera, const Rigid3& pose,
-                                           const Feature& feature) const;
-  void RemoveRows(const std::vector<std::pair<int, int>>& offset_and_size);
-  void ChangeVelocities(const Eigen::Matrix<double, 6, 1>& by, const Matrix6d& covariance);
-  absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
-                                          std::span<const Observation> observations,
-                                          const Rigid3& linearisation,
-                                          const Eigen::VectorXd& step) const;
-  /// From the estimates to where they are linearised: the camera at `linearisation`, everything
-  /// else where the filter expects it then.
-  Eigen::VectorXd StepTo(const Rigid3& linearisation) const;
-  AnchoredPoint MovedPoint(const Feature& feature, const Eigen::VectorXd& step) const;
+  /// Estimates as they were, and how their errors have changed since.
+  struct Marked {
+    StateLayout layout;
+    Robot robot;
+    std::vector<Anchor> anchors;
+    std::vector<Feature> features;
+    Journal journal;
+  };
+  /// What shares knowledge.
+  struct Island {
+    Covariance p;
+    int updates = 0;  // since it began
+    std::optional<Marked> mark;
+  };
+  /// Sparse measurement model of one frame: two rows an observation, three blocks each.
+  struct Linearised {
+    struct Rows : Journal::Updated::Rows {
+      Eigen::Matrix2d noise;
+    };
+    int camera = 0, readout = -1;  // offsets
+    std::vector<Rows> rows;
+    Eigen::VectorXd innovation;
+  };
   /// The matches of one clone, explained by a turn alone.
   struct Turned {
     TurnMisfit misfit;
     int age = 0;              // updates since the clone was made
     std::vector<int> ranges;  // offsets of the inverse ranges
   };
+
+  bool Fej(int island) const {
+    return options_.fej || IslandAt(island).updates <= options_.fej_updates;
+  }
+  Robot& Of(RobotId id);
+  const Robot& Of(RobotId id) const;
+  const Feature* Find(FeatureId id) const;
+  const Anchor* FindAnchor(AnchorPoseId id) const;
+  const Anchor& AnchorOf(const Feature& feature) const { return *FindAnchor(feature.anchor); }
+  int At(BlockId id) const { return layout_[id].offset; }
+  int IslandOf(BlockId id) const { return layout_[id].island; }
+  Island& IslandAt(int island) { return islands_[static_cast<std::size_t>(island)]; }
+  const Island& IslandAt(int island) const { return islands_[static_cast<std::size_t>(island)]; }
+  /// Those of robots, clones or features that are in an island.
+  template <typename Items>
+  auto In(int island, Items& items) const {
+    return std::views::filter(
+        items, [this, island](const auto& each) { return IslandOf(each.block) == island; });
+  }
+
+  // Blocks come and go: births.cpp.
+  BlockId Append(BlockKind kind, int size, int island);
+  void RemoveBlocks(std::span<const BlockId> gone);
+  void Join(int into, int from);
+
+  // Prediction: motion.cpp.
+  void Follow(const MotionModel::Step& step, Robot& robot);
+  static HeadRate RateOf(const HeadMotion& head, double dt, const Robot& robot);
+  void ChangeVelocities(double sign, Robot& robot);
+
+  // Where things are seen: prediction.cpp.
+  AnchoredPoint Point(const Feature& feature, bool first) const;
+  /// Pixel at the current estimates, Jacobians where the options say.
+  std::optional<PixelPrediction> Linearise(const CameraModel& camera, const Robot& robot,
+                                           const Feature& feature) const;
+  /// Covariance of [camera pose, clone, point].
+  using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 15, 15>;
+  SmallMatrix Gather(const Robot& robot, const Anchor& anchor, const Feature& feature) const;
+
+  // Measurement model: linearise.cpp.
+  absl::Status JoinSeen(std::span<const Observation> observations, RobotId robot);
+  absl::StatusOr<Linearised> LineariseAll(const CameraModel& camera,
+                                          std::span<const Observation> observations,
+                                          const Rigid3& linearisation, const Eigen::VectorXd& step,
+                                          const Robot& robot) const;
+  /// One match of a feature with everything moved by `step`; `ahead`: H of clone and point by it.
+  std::optional<PixelPrediction> LineariseOne(const CameraModel& camera, const Feature& feature,
+                                              const Rigid3& linearisation,
+                                              const Eigen::VectorXd& step, Linearised::Rows& rows,
+                                              Eigen::Vector2d& ahead) const;
+  /// From the estimates to where they are linearised: the camera at `linearisation`, everything
+  /// else where the filter expects it then.
+  Eigen::VectorXd StepTo(const Rigid3& linearisation, const Robot& robot) const;
+  AnchoredPoint MovedPoint(const Feature& feature, const Eigen::VectorXd& step) const;
   std::vector<Turned> ExplainByTurning(const CameraModel& camera,
                                        std::span<const Observation> observations,
                                        const Rigid3& linearisation) const;
+
+  // Update: update.cpp.
   /// Of each of their ranges, in order, the share of its gain that is not taken.
-  Eigen::VectorXd KeptShares(const std::vector<Turned>& turned) const;
-  void JudgeNoise(const UpdateReport& report);
+  Eigen::VectorXd KeptShares(const std::vector<Turned>& turned, const Robot& robot) const;
+  static void JudgeNoise(const UpdateReport& report, Robot& robot);
   /// Both: the errors to correct; `gain` and `factor` as the journal wants them.
-  absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, UpdateReport& report,
-                                             Journal::Updated& record);
-  absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, UpdateReport& report,
-                                                  Journal::Updated& record);
-  void Correct(const Eigen::VectorXd& error);
+  static absl::StatusOr<Eigen::VectorXd> KalmanStep(const Linearised& all, Island& island,
+                                                    UpdateReport& report, Journal::Updated& record);
+  static absl::StatusOr<Eigen::VectorXd> InformationStep(const Linearised& all, Island& island,
+                                                         UpdateReport& report,
+                                                         Journal::Updated& record);
+
+  // Correction: correct.cpp.
+  void Correct(const Eigen::VectorXd& error, int island);
   /// Carries the covariance along when estimates move by `step`: a scale error then moves them by
   /// what they are now, not by what they were (docs/derivations/scale.md).
-  void CarryScale(const Eigen::VectorXd& step);
-
-  /// Estimates as they were, and how their errors have changed since.
-  struct Marked {
-    CameraMotion camera;
-    std::vector<Anchor> anchors;
-    std::vector<Feature> features;
-    int dim = 0;
-    Journal journal;
-  };
-  std::optional<Marked> mark_;
-  /// The joints' own part of the camera's velocities, which camera_ is without.
-  struct HeadRate {
-    Eigen::Matrix<double, 6, 1> rate = Eigen::Matrix<double, 6, 1>::Zero();
-    Matrix6d covariance = Matrix6d::Zero();
-  };
-  std::optional<HeadRate> head_;  // none: it was unknown, camera_'s velocities are whole
+  void CarryScale(const Eigen::VectorXd& step, int island);
 
   FilterOptions options_;
-  CameraMotion camera_;
-  Rigid3 first_pose_;
+  const PointParametrisation* form_;
+  StateLayout layout_;
+  std::vector<Island> islands_;
+  std::vector<Robot> robots_;      // rising ids
   std::vector<Anchor> anchors_;    // rising ids
   std::vector<Feature> features_;  // rising ids
+  RobotId next_robot_ = kFirstRobot;
   AnchorPoseId next_anchor_ = 1;
-  double readout_s_ = 0.0;
-  int readout_offset_ = -1;   // -1: not estimated
-  int updates_ = 0;           // since Reset()
-  int judged_ = 0;            // updates that told of the noise
-  double noise_scale_ = 1.0;  // of matches' errors against their R, squared; up to 1
-  Covariance covariance_;
 };
 
 }  // namespace saccade

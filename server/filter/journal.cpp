@@ -18,11 +18,11 @@ VectorXd Apply(const Journal::Updated& update, VectorXd step) {
   VectorXd seen(2 * static_cast<Eigen::Index>(update.rows.size()));
   for (std::size_t k = 0; k < update.rows.size(); ++k) {
     const Journal::Updated::Rows& rows = update.rows[k];
-    Eigen::Vector2d sum = rows.d_camera * step.head<kPoseDim>();
+    Eigen::Vector2d sum = rows.d_camera * step.segment<kPoseDim>(rows.camera);
     if (rows.readout >= 0) sum += rows.d_readout * step[rows.readout];
     if (rows.anchor >= 0) {
       sum += rows.d_anchor * step.segment<kPoseDim>(rows.anchor) +
-             rows.d_point.rightCols(rows.point_dim) * step.segment(rows.point, rows.point_dim);
+             rows.d_point * step.segment(rows.point, rows.d_point.cols());
     }
     seen.segment<2>(2 * static_cast<Eigen::Index>(k)) = sum;
   }
@@ -34,13 +34,14 @@ VectorXd Apply(const Journal::Updated& update, VectorXd step) {
 }
 
 VectorXd Apply(const Journal::Predicted& prediction, VectorXd step) {
-  step.head<12>() = (prediction.f * step.head<12>()).eval();
+  auto part = step.segment(prediction.offset, prediction.f.rows());
+  part = (prediction.f * part).eval();
   return step;
 }
 
-VectorXd Apply(const Journal::Cloned&, VectorXd step) {
+VectorXd Apply(const Journal::Cloned& cloned, VectorXd step) {
   VectorXd longer = Extended(step, kPoseDim);
-  longer.tail<kPoseDim>() = step.head<kPoseDim>();
+  longer.tail<kPoseDim>() = step.segment<kPoseDim>(cloned.offset);
   return longer;
 }
 

@@ -4,10 +4,15 @@
 #include <variant>
 #include <vector>
 
+#include "server/filter/motion_model.hpp"
+
 namespace saccade {
 
-/// What happened to the filter's errors since a mark: enough to carry a correction that is found
-/// late on to the present, as if it had been known at the mark.
+/// A pixel's Jacobian by what of a point is in the state.
+using PointColumns = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 3>;
+
+/// What happened to the errors of an island of the state since a mark: enough to carry a correction
+/// that is found late on to the present, as if it had been known at the mark.
 ///
 /// An update turns an error e into e - K H e, a prediction the camera's into F e; elements come and
 /// go. Carrying a correction through costs O(n m) an update, n numbers, m measurement rows. A
@@ -21,17 +26,20 @@ class Journal {
     Eigen::MatrixXd factor;  // m x m, lower triangle; or empty
     /// H e, from an error e (n) to m numbers.
     struct Rows {
-      int anchor = -1, point = -1, point_dim = 0, readout = -1;  // offsets
+      int camera = 0, anchor = -1, point = -1, readout = -1;  // offsets
       Eigen::Matrix<double, 2, 6> d_camera, d_anchor;
-      Eigen::Matrix<double, 2, 3> d_point;
+      PointColumns d_point;
       Eigen::Vector2d d_readout;
     };
     std::vector<Rows> rows;
   };
   struct Predicted {
-    Eigen::Matrix<double, 12, 12> f;  // of the camera
+    int offset = 0;  // of the camera
+    MotionModel::Square f;
   };
-  struct Cloned {};  // the camera's pose was appended
+  struct Cloned {
+    int offset = 0;  // of the pose that was appended once more
+  };
   struct Appended {
     int size = 0;  // numbers that know nothing of the rest
   };

@@ -3,7 +3,6 @@
 namespace saccade {
 
 using Eigen::Matrix3d;
-using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 CameraMotion Plus(const CameraMotion& camera, const Vector12d& error) {
@@ -22,41 +21,6 @@ Vector12d Minus(const CameraMotion& to, const CameraMotion& from) {
       LogQuaternion(from.world_from_camera.rotation.conjugate() * to.world_from_camera.rotation),
       to.velocity_m_s - from.velocity_m_s, to.angular_velocity_rad_s - from.angular_velocity_rad_s;
   return error;
-}
-
-CameraMotion PropagateMotion(const CameraMotion& camera, double dt,
-                             const Eigen::Matrix<double, 6, 1>& impulse) {
-  CameraMotion next = camera;
-  next.velocity_m_s += impulse.head<3>();
-  next.angular_velocity_rad_s += impulse.tail<3>();
-  next.world_from_camera.translation += dt * next.velocity_m_s;
-  next.world_from_camera.rotation =
-      (camera.world_from_camera.rotation * ExpQuaternion(dt * next.angular_velocity_rad_s))
-          .normalized();
-  return next;
-}
-
-MotionJacobians LineariseMotion(const CameraMotion& camera, const Quaterniond& first_rotation,
-                                double dt, const MotionNoise& noise) {
-  const Vector3d angle = dt * camera.angular_velocity_rad_s;
-  const Quaterniond next = camera.world_from_camera.rotation * ExpQuaternion(angle);
-  const Matrix3d identity = Matrix3d::Identity();
-  const Matrix3d turn = dt * RightJacobianSo3(angle);
-  MotionJacobians result;
-  result.f.block<3, 3>(0, 6) = dt * identity;
-  result.f.block<3, 3>(3, 3) = (next.conjugate() * first_rotation).toRotationMatrix();
-  result.f.block<3, 3>(3, 9) = turn;
-  Eigen::Matrix<double, 12, 6> g = Eigen::Matrix<double, 12, 6>::Zero();
-  g.block<3, 3>(0, 0) = dt * identity;
-  g.block<3, 3>(3, 3) = turn;
-  g.block<3, 3>(6, 0) = identity;
-  g.block<3, 3>(9, 3) = identity;
-  Eigen::Matrix<double, 6, 1> sigma;
-  sigma << Vector3d::Constant(dt * noise.acceleration_m_s2),
-      Vector3d::Constant(dt * noise.angular_acceleration_rad_s2);
-  g *= sigma.asDiagonal();
-  result.q.noalias() = g * g.transpose();
-  return result;
 }
 
 CameraMotion TurnHead(const CameraMotion& camera, const Rigid3& camera_from_next) {
@@ -87,6 +51,18 @@ MotionJacobians LineariseHead(const CameraMotion& camera, const HeadMotion& head
   g.block<3, 3>(9, 3) = Skew(back * w);
   result.q.noalias() = g * head.covariance * g.transpose();
   return result;
+}
+
+Rigid3 PlusPose(const Rigid3& pose, const Eigen::Matrix<double, 6, 1>& error) {
+  return {(pose.rotation * ExpQuaternion(error.tail<3>())).normalized(),
+          pose.translation + error.head<3>()};
+}
+
+void PoseByOrigin(const Rigid3& pose, const Rigid3& origin, Eigen::Ref<Eigen::MatrixXd> rows) {
+  const Matrix3d turn = origin.rotation.toRotationMatrix();
+  rows.block<3, 3>(0, 0).setIdentity();
+  rows.block<3, 3>(0, 3) = -Skew(pose.translation - origin.translation) * turn;
+  rows.block<3, 3>(3, 3) = pose.rotation.toRotationMatrix().transpose() * turn;
 }
 
 }  // namespace saccade

@@ -32,18 +32,6 @@ struct MotionJacobians {
   Matrix12d q = Matrix12d::Zero();      // covariance that the step adds
 };
 
-/// M1, `agile` (slam-spec 3): constant velocity and constant angular velocity for `dt` seconds.
-/// `impulse` [V; Omega] is the random change of the velocities, zero for the mean.
-CameraMotion PropagateMotion(
-    const CameraMotion& camera, double dt,
-    const Eigen::Matrix<double, 6, 1>& impulse = Eigen::Matrix<double, 6, 1>::Zero());
-
-/// Jacobians of the same step. With first-estimates Jacobians `first_rotation` is the rotation that
-/// the errors were last linearised at; otherwise camera.world_from_camera.rotation.
-MotionJacobians LineariseMotion(const CameraMotion& camera,
-                                const Eigen::Quaterniond& first_rotation, double dt,
-                                const MotionNoise& noise);
-
 /// What a mount's joints did to the camera in one step, by its encoders; the wearer's motion comes
 /// on top.
 struct HeadMotion {
@@ -58,5 +46,65 @@ struct HeadMotion {
 CameraMotion TurnHead(const CameraMotion& camera, const Rigid3& camera_from_next);
 /// Its Jacobians; `q` is what the encoders' errors add.
 MotionJacobians LineariseHead(const CameraMotion& camera, const HeadMotion& head);
+
+/// How a camera moves, and what of its motion is in the state. Without state of its own; one file
+/// for each model.
+///
+/// Errors begin with the pose's six [position (world), rotation (local)].
+class MotionModel {
+ public:
+  static constexpr int kMostErrors = 12;
+  using Errors = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostErrors, 1>;
+  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostErrors, kMostErrors>;
+
+  /// A step of the mean, its F and the Q that it adds.
+  struct Step {
+    CameraMotion next;
+    Square f, q;
+  };
+
+  virtual ~MotionModel() = default;
+
+  /// Error dimensions.
+  int dim() const { return dim_; }
+  /// Where the errors of [velocity (world), angular velocity (camera)] are; below 0: it has none.
+  int velocities() const { return velocities_; }
+  /// What of a covariance of all errors of CameraMotion is in the state.
+  Square InState(const Matrix12d& covariance) const { return covariance.topLeftCorner(dim_, dim_); }
+
+  /// `motion` [+] `error`, and its inverse `to` [-] `from`.
+  virtual CameraMotion Plus(const CameraMotion& motion, const Errors& error) const = 0;
+  virtual Errors Minus(const CameraMotion& to, const CameraMotion& from) const = 0;
+  /// On by `dt` seconds; `first_rotation` as LineariseMotion().
+  virtual Step Predict(const CameraMotion& motion, const Eigen::Quaterniond& first_rotation,
+                       double dt, const MotionNoise& noise) const = 0;
+  /// As TurnHead().
+  virtual Step Turn(const CameraMotion& motion, const HeadMotion& head) const = 0;
+
+  /// Of an error, what a wrong scale of the world would look like; the rest zero.
+  virtual Errors OfScale(const Errors& error) const = 0;
+  /// Errors by those of the pose that the world is counted from (docs/derivations/gauge.md), into
+  /// `rows` (dim x 6, zero).
+  virtual void ByOrigin(const CameraMotion& motion, const Rigid3& origin,
+                        Eigen::Ref<Eigen::MatrixXd> rows) const = 0;
+  /// Errors in a world that is turned and scaled by `turn`, by those in the one before.
+  virtual Square InMovedWorld(const Eigen::Matrix3d& turn) const = 0;
+
+ protected:
+  MotionModel(int dim, int velocities) : dim_(dim), velocities_(velocities) {}
+
+ private:
+  const int dim_, velocities_;
+};
+
+/// A camera that stands still: 6 errors, and no prediction adds to them.
+const MotionModel& StandingStill();
+
+/// `pose` [+] `error` [position (world), rotation (local)].
+Rigid3 PlusPose(const Rigid3& pose, const Eigen::Matrix<double, 6, 1>& error);
+
+/// A pose's errors by those of the pose that the world is counted from, into `rows` (6 x 6, zero):
+/// by its error (dr, th) the world has turned by R th about it and moved by dr.
+void PoseByOrigin(const Rigid3& pose, const Rigid3& origin, Eigen::Ref<Eigen::MatrixXd> rows);
 
 }  // namespace saccade

@@ -14,6 +14,14 @@ enum class PointForm {
   kRangeOnly,     // ESID: the same with the bearing frozen; 1 number
 };
 
+/// A point as its clone of the camera sees it.
+struct PointInClone {
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // unit
+  Eigen::Matrix<double, 3, 2> basis =
+      Eigen::Matrix<double, 3, 2>::Zero();  // tangent of the bearing: b [+] d
+  double inverse_range = 1.0;               // [1/m]; may be slightly below 0 while uncertain
+};
+
 /// A point seen from an anchor pose: direction and inverse range there.
 struct AnchoredPoint {
   Rigid3 world_from_anchor;

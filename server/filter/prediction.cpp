@@ -12,33 +12,50 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Covariance of [camera pose, anchor pose, point] and its Jacobians, in one small matrix.
-constexpr int kMostColumns = 15;
-using SmallMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns>;
+constexpr int kPose = FilterState::kPoseDim;
+constexpr int kPoses = 2 * kPose;  // the camera's and the clone's
+constexpr int kMostColumns = kPoses + 3;
 using SmallRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, kMostColumns>;
-
-SmallMatrix Gather(const Covariance& p, int anchor, int point, int point_dim) {
-  const int size = 12 + point_dim;
-  std::array<int, kMostColumns> rows{};
-  for (int k = 0; k < 6; ++k) {
-    rows[k] = k;
-    rows[6 + k] = anchor + k;
-  }
-  for (int k = 0; k < point_dim; ++k) rows[12 + k] = point + k;
-  SmallMatrix block(size, size);
-  for (int c = 0; c < size; ++c) {
-    for (int r = c; r < size; ++r) block(r, c) = block(c, r) = p.at(rows[r], rows[c]);
-  }
-  return block;
-}
 
 }  // namespace
 
-std::optional<PixelPrediction> FilterState::Linearise(const CameraModel& camera, const Rigid3& pose,
+AnchoredPoint FilterState::Point(const Feature& feature, bool first) const {
+  const Anchor& anchor = AnchorOf(feature);
+  const PointInClone& in_clone = first ? feature.first : feature.point;
+  return {first ? anchor.first : anchor.pose, in_clone.bearing, in_clone.basis,
+          feature.point.inverse_range};
+}
+
+AnchoredPoint FilterState::Point(FeatureId id) const { return Point(*Find(id), false); }
+
+FilterState::SmallMatrix FilterState::Gather(const Robot& robot, const Anchor& anchor,
+                                             const Feature& feature) const {
+  const int size = kPoses + form_->dim();
+  const int camera = At(robot.block), from = At(anchor.block), point = At(feature.block);
+  std::array<int, kMostColumns> rows{};
+  for (int k = 0; k < kPose; ++k) {
+    rows[k] = camera + k;
+    rows[kPose + k] = from + k;
+  }
+  for (int k = kPoses; k < size; ++k) rows[k] = point + k - kPoses;
+  const bool shared = IslandOf(robot.block) == IslandOf(anchor.block);
+  const Covariance& p = IslandAt(IslandOf(anchor.block)).p;
+  SmallMatrix block(size, size);
+  for (int c = shared ? 0 : kPose; c < size; ++c) {
+    for (int r = c; r < size; ++r) block(r, c) = block(c, r) = p.at(rows[r], rows[c]);
+  }
+  if (shared) return block;
+  block.topRows<kPose>().setZero();
+  block.leftCols<kPose>().setZero();
+  block.topLeftCorner<kPose, kPose>() = PoseCovariance(robot.id);
+  return block;
+}
+
+std::optional<PixelPrediction> FilterState::Linearise(const CameraModel& camera, const Robot& robot,
                                                       const Feature& feature) const {
+  const Rigid3& pose = robot.motion.world_from_camera;
   auto current = PredictAnchored(camera, pose, Point(feature, false));
-  if (!current || !Fej()) return current;
+  if (!current || !Fej(IslandOf(robot.block))) return current;
   const auto first = PredictAnchored(camera, pose, Point(feature, true));
   if (!first) return current;
   PixelPrediction mixed = *first;
@@ -47,65 +64,62 @@ std::optional<PixelPrediction> FilterState::Linearise(const CameraModel& camera,
   return mixed;
 }
 
-std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
-                                                     FeatureId id) const {
+std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera, FeatureId id,
+                                                     RobotId robot) const {
   const Feature* feature = Find(id);
   if (feature == nullptr) return std::nullopt;
-  const auto at = Linearise(camera, camera_.world_from_camera, *feature);
+  const auto at = Linearise(camera, Of(robot), *feature);
   if (!at) return std::nullopt;
-  const int size = FeatureDim();
-  const SmallMatrix p = Gather(covariance_, AnchorOf(*feature).offset, feature->offset, size);
-  SmallRows h(2, 12 + size);
-  h << at->d_camera, at->d_anchor, at->d_point.rightCols(size);
+  const SmallMatrix p = Gather(Of(robot), AnchorOf(*feature), *feature);
+  SmallRows h(2, p.cols());
+  h << at->d_camera, at->d_anchor, form_->InState(at->d_point);
   const SmallRows hp = h * p;
   PredictedPixel result{*at, hp * h.transpose(), hp.leftCols<6>()};
-  if (size == 1) {
-    const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
-    result.covariance += d_bearing * feature->birth_covariance * d_bearing.transpose();
-  }
+  const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
+  result.covariance += d_bearing * form_->Frozen(feature->birth_covariance) * d_bearing.transpose();
   return result;
 }
 
 std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
-                                                     const Vector3d& known_point) const {
-  const auto at = PredictFixed(camera, camera_.world_from_camera, known_point);
+                                                     const Vector3d& known_point,
+                                                     RobotId robot) const {
+  const auto at = PredictFixed(camera, Of(robot).motion.world_from_camera, known_point);
   if (!at) return std::nullopt;
-  const Eigen::Matrix<double, 2, 6> hp = at->d_camera * PoseCovariance();
+  const Eigen::Matrix<double, 2, 6> hp = at->d_camera * PoseCovariance(robot);
   return PredictedPixel{*at, hp * at->d_camera.transpose(), hp};
 }
 
-FeatureMarginal FilterState::Marginal(FeatureId id) const {
+FeatureMarginal FilterState::Marginal(FeatureId id, RobotId robot) const {
   FeatureMarginal marginal;
   const Feature* feature = Find(id);
   if (feature == nullptr) return marginal;
   const Anchor& anchor = AnchorOf(*feature);
-  const int size = FeatureDim();
-  const SmallMatrix p = Gather(covariance_, anchor.offset, feature->offset, size);
-  const double rho = std::max(feature->inverse_range, options_.min_inverse_range);
+  const PointInClone& point = feature->point;
+  const SmallMatrix p = Gather(Of(robot), anchor, *feature);
+  const int range = kPoses + form_->range();
+  const double rho = std::max(point.inverse_range, options_.min_inverse_range);
   const Matrix3d world_from_anchor = anchor.pose.RotationMatrix();
-  const Vector3d in_anchor = feature->bearing / rho;
-  marginal.inverse_range = feature->inverse_range;
-  marginal.inverse_range_sigma = std::sqrt(std::max(0.0, p(11 + size, 11 + size)));
+  const Vector3d in_anchor = point.bearing / rho;
+  marginal.inverse_range = point.inverse_range;
+  marginal.inverse_range_sigma = std::sqrt(std::max(0.0, p(range, range)));
   marginal.point_in_world = anchor.pose * in_anchor;
   Eigen::Matrix<double, 3, 3> d_point;  // by [bearing tangent, inverse range]
-  d_point.leftCols<2>() = world_from_anchor * feature->basis / rho;
+  d_point.leftCols<2>() = world_from_anchor * point.basis / rho;
   d_point.col(2) = world_from_anchor * in_anchor / -rho;
-  SmallRows in_world(3, 12 + size);
+  SmallRows in_world(3, p.cols());
   in_world << Eigen::Matrix<double, 3, 6>::Zero(), Matrix3d::Identity(),
-      -world_from_anchor * Skew(in_anchor), d_point.rightCols(size);
-  const Rigid3 camera_from_world = camera_.world_from_camera.Inverse();
+      -world_from_anchor * Skew(in_anchor), form_->InState(d_point);
+  const Rigid3 camera_from_world = camera(robot).world_from_camera.Inverse();
   const Matrix3d turn = camera_from_world.RotationMatrix();
   SmallRows in_camera = turn * in_world;
   in_camera.leftCols<3>() = -turn;
   in_camera.middleCols<3>(3) = Skew(camera_from_world * marginal.point_in_world);
   marginal.covariance_in_world = in_world * p * in_world.transpose();
   marginal.covariance_in_camera = in_camera * p * in_camera.transpose();
-  if (size == 1) {
-    const Matrix3d frozen =
-        d_point.leftCols<2>() * feature->birth_covariance * d_point.leftCols<2>().transpose();
-    marginal.covariance_in_world += frozen;
-    marginal.covariance_in_camera += turn * frozen * turn.transpose();
-  }
+  const Matrix3d frozen = d_point.leftCols<2>() * form_->Frozen(feature->birth_covariance) *
+                          d_point.leftCols<2>().transpose();
+  marginal.covariance_in_world += frozen;
+  marginal.covariance_in_camera += turn * frozen * turn.transpose();
   return marginal;
 }
 

@@ -1,21 +1,11 @@
 // The part of FilterState that takes over better estimates (bundle adjustment).
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 
 #include "server/filter/filter_state.hpp"
 
 namespace saccade {
 namespace {
-
-/// Tangent coordinates that MoveBearing() needs to bring a bearing to `target`.
-Eigen::Vector2d BearingStep(const Eigen::Vector3d& bearing,
-                            const Eigen::Matrix<double, 3, 2>& basis,
-                            const Eigen::Vector3d& target) {
-  const Eigen::Vector3d across = target - bearing.dot(target) * bearing;
-  const double sine = across.norm();
-  if (sine < 1e-12) return Eigen::Vector2d::Zero();
-  return std::atan2(sine, bearing.dot(target)) / sine * (basis.transpose() * across);
-}
 
 Eigen::Matrix<double, 6, 1> PoseStep(const Rigid3& from, const Rigid3& to) {
   Eigen::Matrix<double, 6, 1> step;
@@ -25,55 +15,52 @@ Eigen::Matrix<double, 6, 1> PoseStep(const Rigid3& from, const Rigid3& to) {
 
 }  // namespace
 
-std::optional<Rigid3> FilterState::AnchorPose(AnchorPoseId id) const {
-  const auto at = std::lower_bound(anchors_.begin(), anchors_.end(), id,
-                                   [](const Anchor& a, AnchorPoseId key) { return a.id < key; });
-  if (at == anchors_.end() || at->id != id) return std::nullopt;
-  return at->pose;
+void FilterState::Mark(RobotId id) {
+  const Robot& robot = Of(id);
+  const int number = IslandOf(robot.block);
+  Marked& mark = IslandAt(number).mark.emplace();
+  mark.layout = layout_;
+  mark.robot = robot;
+  std::ranges::copy(In(number, anchors_), std::back_inserter(mark.anchors));
+  std::ranges::copy(In(number, features_), std::back_inserter(mark.features));
 }
 
-void FilterState::Mark() {
-  mark_.emplace();
-  mark_->camera = camera_;
-  mark_->anchors = anchors_;
-  mark_->features = features_;
-  mark_->dim = dim();
-}
+void FilterState::DropMark(RobotId id) { IslandAt(IslandOf(Of(id).block)).mark.reset(); }
 
-void FilterState::DropMark() { mark_.reset(); }
-
-void FilterState::Refine(const Refinement& refinement) {
-  if (!mark_) return;
-  const Marked& mark = *mark_;
-  Eigen::VectorXd step = Eigen::VectorXd::Zero(mark.dim);
+void FilterState::Refine(const Refinement& refinement, RobotId id) {
+  const int number = IslandOf(Of(id).block);
+  Island& island = IslandAt(number);
+  if (!island.mark || island.mark->robot.id != id) return;
+  const Marked& mark = *island.mark;
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(mark.layout.dim(number));
+  const auto part = [&](BlockId block) {
+    return step.segment(mark.layout[block].offset, mark.layout[block].size);
+  };
   if (refinement.world_from_camera) {
-    CameraMotion moved = mark.camera;
+    const CameraMotion& then = mark.robot.motion;
+    CameraMotion moved = then;
     moved.world_from_camera = *refinement.world_from_camera;
     moved.velocity_m_s = moved.world_from_camera.rotation *
-                         (mark.camera.world_from_camera.rotation.conjugate() * moved.velocity_m_s);
-    step.head<kCameraDim>() = Minus(moved, mark.camera);
+                         (then.world_from_camera.rotation.conjugate() * moved.velocity_m_s);
+    part(mark.robot.block) = mark.robot.model->Minus(moved, then);
   }
   for (const Anchor& anchor : mark.anchors) {
     const auto better = refinement.anchors.find(anchor.id);
     if (better == refinement.anchors.end()) continue;
-    step.segment<kPoseDim>(anchor.offset) = PoseStep(anchor.pose, better->second);
+    part(anchor.block) = PoseStep(anchor.pose, better->second);
   }
-  const int last = FeatureDim() - 1;
   for (const Feature& feature : mark.features) {
     const auto better = refinement.features.find(feature.id);
     if (better == refinement.features.end()) continue;
-    if (FeatureDim() == 3) {
-      step.segment<2>(feature.offset) =
-          BearingStep(feature.bearing, feature.basis, better->second.bearing);
-    }
-    step[feature.offset + last] = better->second.inverse_range - feature.inverse_range;
+    part(feature.block) =
+        form_->Minus(better->second.bearing, better->second.inverse_range, feature.point);
   }
   step = mark.journal.Carry(std::move(step));
-  mark_.reset();
-  if (!step.allFinite() || step.size() != dim()) return;
-  CarryScale(step);
-  Correct(step);
-  first_pose_ = camera_.world_from_camera;
+  island.mark.reset();
+  if (!step.allFinite() || step.size() != island.p.dim()) return;
+  CarryScale(step, number);
+  Correct(step, number);
+  for (Robot& robot : In(number, robots_)) robot.first_pose = robot.motion.world_from_camera;
 }
 
 }  // namespace saccade

@@ -13,20 +13,21 @@ constexpr int kMature = 1000;  // updates: depths are known, Jacobians need no f
 std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMotion& camera,
                                             const Matrix12d& covariance) {
   Reset(camera, covariance);
-  updates_ = kMature;
-  const bool with_bearing = FeatureDim() == 3;
+  Robot& robot = Of(kFirstRobot);
+  const int number = IslandOf(robot.block);
+  Island& island = IslandAt(number);
+  island.updates = kMature;
+  const int first = robot.model->dim();
   std::vector<int> rows;  // of seed.covariance, in the order of the state
-  int first = dim();
-  if (readout_offset_ >= 0) {
-    first = readout_offset_;
-    readout_s_ = seed.readout_s;
+  if (robot.readout != kNoBlock) {
+    robot.readout_s = seed.readout_s;
     rows.push_back(0);
   }
   std::vector<AnchorPoseId> ids;
   for (std::size_t k = 0; k < seed.anchors.size(); ++k) {
-    const int offset = covariance_.Append(kPoseDim);
+    const BlockId block = Append(BlockKind::kClone, kPoseDim, number);
     for (int r = 0; r < kPoseDim; ++r) rows.push_back(1 + kPoseDim * static_cast<int>(k) + r);
-    anchors_.push_back({next_anchor_, offset, 0, updates_, seed.anchors[k], seed.anchors[k]});
+    anchors_.push_back({next_anchor_, block, 0, kMature, seed.anchors[k], seed.anchors[k]});
     ids.push_back(next_anchor_++);
   }
   const int points = 1 + kPoseDim * static_cast<int>(seed.anchors.size());
@@ -35,12 +36,10 @@ std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMot
     Feature feature;
     feature.id = from.id;
     feature.anchor = ids[static_cast<std::size_t>(from.anchor)];
-    feature.bearing = feature.first_bearing = from.bearing;
-    feature.basis = feature.first_basis = TangentBasis(from.bearing);
-    feature.inverse_range = from.inverse_range;
+    feature.point = feature.first = {from.bearing, TangentBasis(from.bearing), from.inverse_range};
     feature.birth_covariance = from.birth_covariance;
-    feature.offset = covariance_.Append(FeatureDim());
-    for (int r = with_bearing ? 0 : 2; r < 3; ++r) {
+    feature.block = Append(BlockKind::kFeature, form_->dim(), number);
+    for (int r = 3 - form_->dim(); r < 3; ++r) {
       rows.push_back(points + 3 * static_cast<int>(k) + r);
     }
     features_.push_back(feature);
@@ -48,7 +47,7 @@ std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMot
   }
   for (std::size_t c = 0; c < rows.size(); ++c) {
     for (std::size_t r = c; r < rows.size(); ++r) {
-      covariance_.lower(first + static_cast<int>(r), first + static_cast<int>(c)) =
+      island.p.lower(first + static_cast<int>(r), first + static_cast<int>(c)) =
           seed.covariance(rows[r], rows[c]);
     }
   }

@@ -1,16 +1,12 @@
 // The part of FilterState that corrects it with matched pixels.
-#include <absl/strings/str_cat.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <map>
 
 #include "server/filter/filter_state.hpp"
 #include "server/filter/parallax.hpp"
 
 namespace saccade {
 
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -29,163 +25,40 @@ bool Sudden(double error_s, const MatrixXd& before) {
 
 }  // namespace
 
-/// Sparse measurement model of one frame: two rows an observation, three blocks
-/// each.
-struct FilterState::Linearised {
-  struct Rows : Journal::Updated::Rows {
-    Eigen::Matrix2d noise;
-  };
-  std::vector<Rows> rows;
-  VectorXd innovation;
-};
-
-VectorXd FilterState::StepTo(const Rigid3& linearisation) const {
-  CameraMotion moved = camera_;
-  moved.world_from_camera = linearisation;
-  const Eigen::Matrix<double, 6, 1> of_camera = Minus(moved, camera_).head<6>();
-  VectorXd step = VectorXd::Zero(dim());
-  const Eigen::LDLT<Matrix6d> factor(PoseCovariance());
-  if (factor.info() == Eigen::Success && factor.vectorD().minCoeff() > 0.0) {
-    MatrixXd columns(dim(), kPoseDim);
-    covariance_.CopyColumns(0, kPoseDim, columns);
-    step = columns * factor.solve(of_camera);
-    if (!step.allFinite()) step.setZero();
-  }
-  step.head<6>() = of_camera;
-  return step;
-}
-
-AnchoredPoint FilterState::MovedPoint(const Feature& feature, const VectorXd& step) const {
-  AnchoredPoint point = Point(feature, false);
-  const int at = AnchorOf(feature).offset;
-  point.world_from_anchor.translation += step.segment<3>(at);
-  point.world_from_anchor.rotation =
-      (point.world_from_anchor.rotation * ExpQuaternion(step.segment<3>(at + 3))).normalized();
-  const auto part = step.segment(feature.offset, FeatureDim());
-  if (FeatureDim() == 3) MoveBearing(part.head<2>(), point.bearing, point.basis);
-  point.inverse_range += part[part.size() - 1];
-  return point;
-}
-
-absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
-    const CameraModel& camera, std::span<const Observation> observations,
-    const Rigid3& linearisation, const VectorXd& step) const {
-  const Matrix3d turn = RightJacobianSo3(step.segment<3>(3));
-  Linearised all;
-  all.rows.resize(observations.size());
-  all.innovation.resize(2 * static_cast<Eigen::Index>(observations.size()));
-  for (std::size_t k = 0; k < observations.size(); ++k) {
-    const Observation& observation = observations[k];
-    Linearised::Rows& rows = all.rows[k];
-    rows.noise = observation.noise;
-    rows.readout = readout_offset_;
-    rows.d_readout = observation.d_readout;
-    std::optional<PixelPrediction> at;
-    Eigen::Vector2d ahead = Eigen::Vector2d::Zero();
-    if (observation.known_point) {
-      at = PredictFixed(camera, linearisation, *observation.known_point);
-    } else if (const Feature* feature = Find(observation.id)) {
-      at = PredictAnchored(camera, linearisation, MovedPoint(*feature, step));
-      if (at && Fej()) {
-        if (const auto first = PredictAnchored(camera, linearisation, Point(*feature, true))) {
-          at->d_camera = first->d_camera;
-          at->d_anchor = first->d_anchor;
-          at->d_point = first->d_point;
-        }
-      }
-      rows.anchor = AnchorOf(*feature).offset;
-      rows.point = feature->offset;
-      rows.point_dim = FeatureDim();
-      if (at) {
-        if (!Fej()) {
-          at->d_anchor.rightCols<3>() *= RightJacobianSo3(step.segment<3>(rows.anchor + 3)).eval();
-        }
-        ahead = at->d_anchor * step.segment<6>(rows.anchor) +
-                at->d_point.rightCols(rows.point_dim) * step.segment(rows.point, rows.point_dim);
-        if (rows.point_dim == 1) {
-          const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
-          rows.noise += d_bearing * feature->birth_covariance * d_bearing.transpose();
-        }
-      }
-    }
-    if (!at) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("filter: feature ", observation.id, " is unknown or not in view"));
-    }
-    rows.d_camera = at->d_camera;
-    rows.d_camera.rightCols<3>() = at->d_camera.rightCols<3>() * turn;
-    rows.d_anchor = at->d_anchor;
-    rows.d_point = at->d_point;
-    if (readout_offset_ >= 0) ahead += rows.d_readout * step[readout_offset_];
-    all.innovation.segment<2>(2 * static_cast<Eigen::Index>(k)) =
-        observation.pixel - at->pixel + rows.d_camera * step.head<6>() + ahead;
-  }
-  return all;
-}
-
-std::vector<FilterState::Turned> FilterState::ExplainByTurning(
-    const CameraModel& camera, std::span<const Observation> observations,
-    const Rigid3& linearisation) const {
-  std::map<AnchorPoseId, std::vector<TurnResidual>> residuals;
-  std::map<AnchorPoseId, Turned> turned;
-  for (const Observation& observation : observations) {
-    if (observation.known_point) continue;
-    const Feature& feature = *Find(observation.id);
-    // As first seen: bearings that were corrected since may have taken up some parallax.
-    AnchoredPoint far = Point(feature, true);
-    far.world_from_anchor = AnchorOf(feature).pose;
-    far.inverse_range = 0.0;
-    const auto at = PredictAnchored(camera, linearisation, far);
-    if (!at) continue;
-    const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
-    residuals[feature.anchor].push_back(
-        {observation.pixel - at->pixel, at->d_camera.rightCols<3>(),
-         observation.noise + d_bearing * feature.birth_covariance * d_bearing.transpose()});
-    turned[feature.anchor].age = updates_ - AnchorOf(feature).born;
-    turned[feature.anchor].ranges.push_back(feature.offset + FeatureDim() - 1);
-  }
-  std::vector<Turned> all;
-  for (auto& [anchor, each] : turned) {
-    each.misfit = FitTurn(residuals[anchor]);
-    all.push_back(std::move(each));
-  }
-  return all;
-}
-
-absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, UpdateReport& report,
-                                                 Journal::Updated& record) {
-  const int n = dim();
+absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, Island& island,
+                                                 UpdateReport& report, Journal::Updated& record) {
+  Covariance& p = island.p;
+  const int n = p.dim();
   const int m = static_cast<int>(all.innovation.size());
   MatrixXd pht(n, m);  // P H^T
   MatrixXd camera_columns(n, kPoseDim), anchor_columns(n, kPoseDim), point_columns(n, 3);
-  covariance_.CopyColumns(0, kPoseDim, camera_columns);
+  p.CopyColumns(all.camera, kPoseDim, camera_columns);
   MatrixXd readout_column(n, 1);
-  if (readout_offset_ >= 0) covariance_.CopyColumns(readout_offset_, 1, readout_column);
+  if (all.readout >= 0) p.CopyColumns(all.readout, 1, readout_column);
   int copied = -1;  // clones come in runs: ids rise with their features
   for (std::size_t k = 0; k < all.rows.size(); ++k) {
     const Linearised::Rows& rows = all.rows[k];
     auto columns = pht.middleCols<2>(2 * static_cast<Eigen::Index>(k));
     columns.noalias() = camera_columns * rows.d_camera.transpose();
-    if (readout_offset_ >= 0) columns.noalias() += readout_column * rows.d_readout.transpose();
+    if (all.readout >= 0) columns.noalias() += readout_column * rows.d_readout.transpose();
     if (rows.anchor < 0) continue;
-    if (rows.anchor != copied) covariance_.CopyColumns(rows.anchor, kPoseDim, anchor_columns);
+    if (rows.anchor != copied) p.CopyColumns(rows.anchor, kPoseDim, anchor_columns);
     copied = rows.anchor;
     columns.noalias() += anchor_columns * rows.d_anchor.transpose();
-    covariance_.CopyColumns(rows.point, rows.point_dim, point_columns.leftCols(rows.point_dim));
-    columns.noalias() +=
-        point_columns.leftCols(rows.point_dim) * rows.d_point.rightCols(rows.point_dim).transpose();
+    const int size = static_cast<int>(rows.d_point.cols());
+    p.CopyColumns(rows.point, size, point_columns.leftCols(size));
+    columns.noalias() += point_columns.leftCols(size) * rows.d_point.transpose();
   }
   MatrixXd s(m, m);
   for (std::size_t k = 0; k < all.rows.size(); ++k) {
     const Linearised::Rows& rows = all.rows[k];
     const auto at = 2 * static_cast<Eigen::Index>(k);
     auto block = s.middleRows<2>(at);
-    block.noalias() = rows.d_camera * pht.topRows<kPoseDim>();
-    if (readout_offset_ >= 0) block.noalias() += rows.d_readout * pht.row(readout_offset_);
+    block.noalias() = rows.d_camera * pht.middleRows<kPoseDim>(all.camera);
+    if (all.readout >= 0) block.noalias() += rows.d_readout * pht.row(all.readout);
     if (rows.anchor >= 0) {
       block.noalias() += rows.d_anchor * pht.middleRows<kPoseDim>(rows.anchor);
-      block.noalias() +=
-          rows.d_point.rightCols(rows.point_dim) * pht.middleRows(rows.point, rows.point_dim);
+      block.noalias() += rows.d_point * pht.middleRows(rows.point, rows.d_point.cols());
     }
     s.block<2, 2>(at, at) += rows.noise;
   }
@@ -199,38 +72,39 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, UpdateRe
   report.rows = m;
   VectorXd error = pht * whitened;
   if (!error.allFinite()) return absl::FailedPreconditionError("filter: update is not finite");
-  covariance_.Downdate(pht);
-  if (mark_) {
+  p.Downdate(pht);
+  if (island.mark) {
     record.gain = std::move(pht);
     record.factor = factor.matrixL();
   }
   return error;
 }
 
-absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, UpdateReport& report,
+absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, Island& island,
+                                                      UpdateReport& report,
                                                       Journal::Updated& record) {
-  const int n = dim();
+  Covariance& p = island.p;
+  const int n = p.dim();
   const int m = static_cast<int>(all.innovation.size());
-  // P+ = (I + P A)^-1 P with A = sum H_k^T R_k^-1 H_k: P itself need not be
-  // invertible.
+  // P+ = (I + P A)^-1 P with A = sum H_k^T R_k^-1 H_k: P itself need not be invertible.
   MatrixXd h = MatrixXd::Zero(m, n);
   MatrixXd weighted(m, n);
   VectorXd weighted_innovation(m);
   for (std::size_t k = 0; k < all.rows.size(); ++k) {
     const Linearised::Rows& rows = all.rows[k];
     const auto at = 2 * static_cast<Eigen::Index>(k);
-    h.block<2, kPoseDim>(at, 0) = rows.d_camera;
-    if (readout_offset_ >= 0) h.block<2, 1>(at, readout_offset_) = rows.d_readout;
+    h.block<2, kPoseDim>(at, all.camera) = rows.d_camera;
+    if (all.readout >= 0) h.block<2, 1>(at, all.readout) = rows.d_readout;
     if (rows.anchor >= 0) {
       h.block<2, kPoseDim>(at, rows.anchor) = rows.d_anchor;
-      h.block(at, rows.point, 2, rows.point_dim) = rows.d_point.rightCols(rows.point_dim);
+      h.block(at, rows.point, 2, rows.d_point.cols()) = rows.d_point;
     }
     const Eigen::Matrix2d weight = rows.noise.inverse();
     weighted.middleRows<2>(at) = weight * h.middleRows<2>(at);
     weighted_innovation.segment<2>(at) = weight * all.innovation.segment<2>(at);
   }
   const MatrixXd information = h.transpose() * weighted;
-  const MatrixXd prior = covariance_.Full();
+  const MatrixXd prior = p.Full();
   const Eigen::PartialPivLU<MatrixXd> lu(MatrixXd::Identity(n, n) + prior * information);
   const MatrixXd posterior = lu.solve(prior);
   const VectorXd pulled = h.transpose() * weighted_innovation;
@@ -240,12 +114,12 @@ absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, Upd
   }
   report.rows = m;
   report.nis = all.innovation.dot(weighted_innovation) - pulled.dot(error);
-  covariance_.Assign(0.5 * (posterior + posterior.transpose()));
-  if (mark_) record.gain.noalias() = posterior * weighted.transpose();
+  p.Assign(0.5 * (posterior + posterior.transpose()));
+  if (island.mark) record.gain.noalias() = posterior * weighted.transpose();
   return error;
 }
 
-void FilterState::JudgeNoise(const UpdateReport& report) {
+void FilterState::JudgeNoise(const UpdateReport& report, Robot& robot) {
   // R is set with a margin; parallax is judged by how large the matches' errors really are.
   constexpr double kMemory = 30.0;  // updates
   constexpr double kLeastScale = 0.05;
@@ -253,15 +127,16 @@ void FilterState::JudgeNoise(const UpdateReport& report) {
   if (report.rows < kFewestRows) return;
   // The camera's own six numbers hardly surprise: they take no part.
   const double seen = std::clamp(report.nis / (report.rows - kPoseDim), kLeastScale, 1.0);
-  noise_scale_ += (seen - noise_scale_) / std::min<double>(kMemory, ++judged_);
+  robot.noise_scale += (seen - robot.noise_scale) / std::min<double>(kMemory, ++robot.judged);
 }
 
-VectorXd FilterState::KeptShares(const std::vector<Turned>& turned) const {
+VectorXd FilterState::KeptShares(const std::vector<Turned>& turned, const Robot& robot) const {
   constexpr double kDoubling = 10.0;  // updates
   // However good matches are: a patch seen from elsewhere is off by 0.3 px and more, and always the
   // same way. A young map needs every hint of depth.
   constexpr double kBias = 0.5;  // of R
-  const double noise_scale = std::max(noise_scale_, updates_ > kYoung ? kBias : 0.0);
+  const int updates = IslandAt(IslandOf(robot.block)).updates;
+  const double noise_scale = std::max(robot.noise_scale, updates > kYoung ? kBias : 0.0);
   std::vector<double> kept;
   for (const Turned& each : turned) {
     // The errors at birth are the same in every frame: what is unlikely once is not for long.
@@ -274,14 +149,18 @@ VectorXd FilterState::KeptShares(const std::vector<Turned>& turned) const {
 
 absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
                                                  std::span<const Observation> observations,
-                                                 const Rigid3& linearisation) {
+                                                 const Rigid3& linearisation, RobotId id) {
   UpdateReport report;
   if (observations.empty()) return report;
-  const VectorXd ahead = StepTo(linearisation);
-  const auto all = LineariseAll(camera, observations, linearisation, ahead);
+  if (const absl::Status status = JoinSeen(observations, id); !status.ok()) return status;
+  Robot& robot = Of(id);
+  const int number = IslandOf(robot.block);
+  Island& island = IslandAt(number);
+  const VectorXd ahead = StepTo(linearisation, robot);
+  const auto all = LineariseAll(camera, observations, linearisation, ahead, robot);
   if (!all.ok()) return all.status();
-  ++updates_;
-  CarryScale(ahead);
+  ++island.updates;
+  CarryScale(ahead, number);
   std::vector<Turned> turned;
   if (options_.parallax_sigmas > 0.0)
     turned = ExplainByTurning(camera, observations, linearisation);
@@ -289,90 +168,35 @@ absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
   for (const Turned& each : turned) {
     ranges.insert(ranges.end(), each.ranges.begin(), each.ranges.end());
   }
-  if (readout_offset_ >= 0) ranges.push_back(readout_offset_);  // the last
-  const MatrixXd before = covariance_.Among(ranges);
-  const bool information = static_cast<int>(all->innovation.size()) > dim();
+  if (all->readout >= 0) ranges.push_back(all->readout);  // the last
+  const MatrixXd before = island.p.Among(ranges);
+  const bool information = static_cast<int>(all->innovation.size()) > island.p.dim();
   Journal::Updated record;
-  auto error =
-      information ? InformationStep(*all, report, record) : KalmanStep(*all, report, record);
+  auto error = information ? InformationStep(*all, island, report, record)
+                           : KalmanStep(*all, island, report, record);
   if (!error.ok()) return error.status();
-  JudgeNoise(report);
+  JudgeNoise(report, robot);
   // Partial update (docs/derivations/parallax.md): inverse ranges take only a share of their gain.
-  VectorXd kept = KeptShares(turned);
-  if (readout_offset_ >= 0) {
+  VectorXd kept = KeptShares(turned, robot);
+  if (all->readout >= 0) {
     kept.conservativeResize(kept.size() + 1);
-    const bool sudden = updates_ > kYoung && Sudden((*error)[readout_offset_], before);
+    const bool sudden = island.updates > kYoung && Sudden((*error)[all->readout], before);
     kept.tail<1>()[0] = sudden ? 1.0 : 0.0;
   }
   for (std::size_t k = 0; k < ranges.size(); ++k) {
     const double taken = 1.0 - kept[static_cast<Eigen::Index>(k)];
     (*error)[ranges[k]] *= taken;
-    if (mark_) record.gain.row(ranges[k]) *= taken;
+    if (island.mark) record.gain.row(ranges[k]) *= taken;
   }
-  if (mark_) {
+  if (island.mark) {
     record.rows.assign(all->rows.begin(), all->rows.end());
-    mark_->journal.Add(std::move(record));
+    island.mark->journal.Add(std::move(record));
   }
-  covariance_.Blend(ranges, before, kept * kept.transpose());
-  first_pose_ = linearisation;
-  CarryScale(*error - ahead);
-  Correct(*error);
+  island.p.Blend(ranges, before, kept * kept.transpose());
+  robot.first_pose = linearisation;
+  CarryScale(*error - ahead, number);
+  Correct(*error, number);
   return report;
-}
-
-void FilterState::CarryScale(const VectorXd& step) {
-  if (updates_ <= options_.carry_scale_after) return;
-  const int last = FeatureDim() - 1;
-  VectorXd w = VectorXd::Zero(dim());
-  VectorXd d = VectorXd::Zero(dim());
-  double total = 0.0;
-  for (const Feature& feature : features_) {
-    const int at = feature.offset + last;
-    const double rho = feature.inverse_range;
-    if (rho < options_.min_inverse_range) continue;
-    // Weight by information; w^T N = 1 for the scale direction N = (positions,
-    // -rho).
-    const double information = rho * rho / std::max(covariance_.at(at, at), 1e-12);
-    w[at] = -information / rho;
-    total += information;
-    d[at] = -step[at];
-  }
-  if (total <= 0.0) return;
-  w /= total;
-  d.segment<3>(0) = step.segment<3>(0);
-  d.segment<3>(6) = step.segment<3>(6);
-  if (!Fej()) {
-    for (const Anchor& anchor : anchors_) {
-      d.segment<3>(anchor.offset) = step.segment<3>(anchor.offset);
-    }
-  }
-  covariance_.TransformRankOne(d, w);
-}
-
-void FilterState::Correct(const VectorXd& error) {
-  // P is in the tangent space before the correction; G = Jr(d) carries it to
-  // the one after.
-  constexpr double kNegligible_rad = 1e-9;
-  const auto carry = [&](int offset) {
-    const Eigen::Vector3d turned = error.segment<3>(offset);
-    if (turned.squaredNorm() < kNegligible_rad * kNegligible_rad) return;
-    covariance_.TransformBlock(offset, RightJacobianSo3(turned));
-  };
-  camera_ = Plus(camera_, error.head<kCameraDim>());
-  carry(3);
-  if (readout_offset_ >= 0) readout_s_ += error[readout_offset_];
-  for (Anchor& anchor : anchors_) {
-    anchor.pose.translation += error.segment<3>(anchor.offset);
-    anchor.pose.rotation =
-        (anchor.pose.rotation * ExpQuaternion(error.segment<3>(anchor.offset + 3))).normalized();
-    carry(anchor.offset + 3);
-  }
-  const bool with_bearing = FeatureDim() == 3;
-  for (Feature& feature : features_) {
-    const auto part = error.segment(feature.offset, FeatureDim());
-    if (with_bearing) MoveBearing(part.head<2>(), feature.bearing, feature.basis);
-    feature.inverse_range += part[part.size() - 1];
-  }
 }
 
 }  // namespace saccade

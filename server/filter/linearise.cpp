@@ -1,0 +1,151 @@
+// The part of FilterState that makes one frame's matches linear.
+#include <absl/strings/str_cat.h>
+
+#include <Eigen/Cholesky>
+#include <map>
+
+#include "server/filter/filter_state.hpp"
+
+namespace saccade {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+absl::Status NotInView(FeatureId id) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("filter: feature ", id, " is unknown or not in view"));
+}
+
+}  // namespace
+
+absl::Status FilterState::JoinSeen(std::span<const Observation> observations, RobotId id) {
+  if (!HasRobot(id)) return absl::InvalidArgumentError(absl::StrCat("filter: no robot ", id));
+  for (const Observation& seen : observations) {
+    if (!seen.known_point && !Has(seen.id)) return NotInView(seen.id);
+  }
+  const BlockId robot = Of(id).block;
+  for (const Observation& seen : observations) {
+    if (!seen.known_point) Join(IslandOf(robot), IslandOf(Find(seen.id)->block));
+  }
+  return absl::OkStatus();
+}
+
+VectorXd FilterState::StepTo(const Rigid3& linearisation, const Robot& robot) const {
+  CameraMotion moved = robot.motion;
+  moved.world_from_camera = linearisation;
+  const Eigen::Matrix<double, 6, 1> of_camera = Minus(moved, robot.motion).head<6>();
+  const Covariance& p = IslandAt(IslandOf(robot.block)).p;
+  const int at = At(robot.block);
+  VectorXd step = VectorXd::Zero(p.dim());
+  const Eigen::LDLT<Matrix6d> factor(PoseCovariance(robot.id));
+  if (factor.info() == Eigen::Success && factor.vectorD().minCoeff() > 0.0) {
+    MatrixXd columns(p.dim(), kPoseDim);
+    p.CopyColumns(at, kPoseDim, columns);
+    step = columns * factor.solve(of_camera);
+    if (!step.allFinite()) step.setZero();
+  }
+  step.segment<6>(at) = of_camera;
+  return step;
+}
+
+AnchoredPoint FilterState::MovedPoint(const Feature& feature, const VectorXd& step) const {
+  const Anchor& anchor = AnchorOf(feature);
+  PointInClone point = feature.point;
+  form_->Move(step.segment(At(feature.block), form_->dim()), point);
+  return {PlusPose(anchor.pose, step.segment<6>(At(anchor.block))), point.bearing, point.basis,
+          point.inverse_range};
+}
+
+std::optional<PixelPrediction> FilterState::LineariseOne(
+    const CameraModel& camera, const Feature& feature, const Rigid3& linearisation,
+    const VectorXd& step, Linearised::Rows& rows, Eigen::Vector2d& ahead) const {
+  auto at = PredictAnchored(camera, linearisation, MovedPoint(feature, step));
+  if (!at) return at;
+  const bool fej = Fej(IslandOf(feature.block));
+  if (fej) {
+    if (const auto first = PredictAnchored(camera, linearisation, Point(feature, true))) {
+      at->d_camera = first->d_camera;
+      at->d_anchor = first->d_anchor;
+      at->d_point = first->d_point;
+    }
+  }
+  rows.anchor = At(AnchorOf(feature).block);
+  rows.point = At(feature.block);
+  if (!fej) {
+    at->d_anchor.rightCols<3>() *= RightJacobianSo3(step.segment<3>(rows.anchor + 3)).eval();
+  }
+  ahead = at->d_anchor * step.segment<6>(rows.anchor) +
+          form_->InState(at->d_point) * step.segment(rows.point, form_->dim());
+  const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
+  rows.noise += d_bearing * form_->Frozen(feature.birth_covariance) * d_bearing.transpose();
+  return at;
+}
+
+absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
+    const CameraModel& camera, std::span<const Observation> observations,
+    const Rigid3& linearisation, const VectorXd& step, const Robot& robot) const {
+  Linearised all;
+  all.camera = At(robot.block);
+  all.readout = robot.readout == kNoBlock ? -1 : At(robot.readout);
+  const Matrix3d turn = RightJacobianSo3(step.segment<3>(all.camera + 3));
+  all.rows.resize(observations.size());
+  all.innovation.resize(2 * static_cast<Eigen::Index>(observations.size()));
+  for (std::size_t k = 0; k < observations.size(); ++k) {
+    const Observation& observation = observations[k];
+    Linearised::Rows& rows = all.rows[k];
+    rows.noise = observation.noise;
+    rows.camera = all.camera;
+    rows.readout = all.readout;
+    rows.d_readout = observation.d_readout;
+    Eigen::Vector2d ahead = Eigen::Vector2d::Zero();
+    const auto at =
+        observation.known_point
+            ? PredictFixed(camera, linearisation, *observation.known_point)
+            : LineariseOne(camera, *Find(observation.id), linearisation, step, rows, ahead);
+    if (!at) return NotInView(observation.id);
+    rows.d_camera = at->d_camera;
+    rows.d_camera.rightCols<3>() = at->d_camera.rightCols<3>() * turn;
+    rows.d_anchor = at->d_anchor;
+    rows.d_point = form_->InState(at->d_point);
+    if (all.readout >= 0) ahead += rows.d_readout * step[all.readout];
+    all.innovation.segment<2>(2 * static_cast<Eigen::Index>(k)) =
+        observation.pixel - at->pixel + rows.d_camera * step.segment<6>(all.camera) + ahead;
+  }
+  return all;
+}
+
+std::vector<FilterState::Turned> FilterState::ExplainByTurning(
+    const CameraModel& camera, std::span<const Observation> observations,
+    const Rigid3& linearisation) const {
+  std::map<AnchorPoseId, std::vector<TurnResidual>> residuals;
+  std::map<AnchorPoseId, Turned> turned;
+  for (const Observation& observation : observations) {
+    if (observation.known_point) continue;
+    const Feature& feature = *Find(observation.id);
+    const Anchor& anchor = AnchorOf(feature);
+    // As first seen: bearings that were corrected since may have taken up some parallax.
+    AnchoredPoint far = Point(feature, true);
+    far.world_from_anchor = anchor.pose;
+    far.inverse_range = 0.0;
+    const auto at = PredictAnchored(camera, linearisation, far);
+    if (!at) continue;
+    const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
+    residuals[feature.anchor].push_back(
+        {observation.pixel - at->pixel, at->d_camera.rightCols<3>(),
+         observation.noise + d_bearing * feature.birth_covariance * d_bearing.transpose()});
+    const int updates = IslandAt(IslandOf(anchor.block)).updates;
+    turned[feature.anchor].age = updates - anchor.born;
+    turned[feature.anchor].ranges.push_back(At(feature.block) + form_->range());
+  }
+  std::vector<Turned> all;
+  for (auto& [id, each] : turned) {
+    each.misfit = FitTurn(residuals[id]);
+    all.push_back(std::move(each));
+  }
+  return all;
+}
+
+}  // namespace saccade
