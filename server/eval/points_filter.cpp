@@ -162,7 +162,7 @@ absl::Status PointsFilter::Birth(const PointsFrame& frame, std::size_t matched) 
   }
   if (fresh.size() < kWorthAClone) return absl::OkStatus();
   const double inverse_range = MedianInverseRange(frame);
-  const AnchorPoseId anchor = filter_.AddAnchor();
+  const CloneId clone = filter_.AddClone();
   for (const PointObservation* seen : fresh) {
     Eigen::Matrix<double, 3, 2> d_bearing;
     const auto bearing = world_.camera.Unproject(seen->pixel, &d_bearing);
@@ -174,7 +174,7 @@ absl::Status PointsFilter::Birth(const PointsFrame& frame, std::size_t matched) 
         options_.noise_px * options_.noise_px * d_bearing * d_bearing.transpose();
     birth.inverse_range = inverse_range;
     birth.inverse_range_sigma = kRelativeDepthSigma * inverse_range;
-    if (const absl::Status status = filter_.AddFeature(anchor, birth); !status.ok()) return status;
+    if (const absl::Status status = filter_.AddFeature(clone, birth); !status.ok()) return status;
     mapped_.insert(seen->point);
     id_of_point_[static_cast<std::size_t>(seen->point)] = birth.id;
   }

@@ -61,7 +61,7 @@ std::vector<PointsTracker::Match> PointsTracker::Search(const PointsFrame& frame
   for (const PointObservation& each : frame.observations) seen[each.point] = each.pixel;
   std::vector<Match> matches;
   const auto add = [&](int point, FeatureId id, const std::optional<PredictedPixel>& predicted,
-                       const std::variant<AnchoredPoint, Eigen::Vector3d>& place) {
+                       const std::variant<PointFromClone, Eigen::Vector3d>& place) {
     if (!predicted || !world_.camera.InImage(predicted->at.pixel, kBorder_px)) return;
     Match match;
     match.id = id;
@@ -179,7 +179,7 @@ absl::Status PointsTracker::Birth(const PointsFrame& frame, int accepted) {
   for (std::size_t k = fresh.size(); k > 1; --k) std::swap(fresh[k - 1], fresh[random_() % k]);
   fresh.resize(std::min(fresh.size(), kBirths));
   last_birth_ = frame_;
-  const AnchorPoseId anchor = filter_.AddAnchor();
+  const CloneId clone = filter_.AddClone();
   for (const PointObservation* seen : fresh) {
     Eigen::Matrix<double, 3, 2> d_bearing;
     const auto bearing = world_.camera.Unproject(seen->pixel, &d_bearing);
@@ -193,7 +193,7 @@ absl::Status PointsTracker::Birth(const PointsFrame& frame, int accepted) {
         options_.noise_px * options_.noise_px * d_bearing * d_bearing.transpose();
     birth.inverse_range = inverse_range_;
     birth.inverse_range_sigma = kRelativeDepthSigma * inverse_range_;
-    if (const absl::Status status = filter_.AddFeature(anchor, birth); !status.ok()) return status;
+    if (const absl::Status status = filter_.AddFeature(clone, birth); !status.ok()) return status;
     landmark.last_matched_frame = frame_;
     map_.Add(std::move(landmark));
     point_of_[birth.id] = seen->point;

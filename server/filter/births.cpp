@@ -13,39 +13,39 @@ BlockId FilterState::Append(BlockKind kind, int size, int island) {
   return layout_.Add(kind, size, island);
 }
 
-AnchorPoseId FilterState::AddAnchor(RobotId id) {
+CloneId FilterState::AddClone(RobotId id) {
   const Robot& robot = Of(id);
   const int number = IslandOf(robot.block), at = At(robot.block);
   Island& island = IslandAt(number);
   const Eigen::MatrixXd rows = island.p.Block(at, 0, kPoseDim, island.p.dim());
   const BlockId block = Append(BlockKind::kClone, kPoseDim, number);
   const int offset = At(block);
-  if (island.mark) island.mark->journal.Add(Journal::Cloned{at});
+  if (island.checkpoint) island.checkpoint->journal.Add(Journal::Cloned{at});
   for (int c = 0; c < offset; ++c) {
     for (int r = 0; r < kPoseDim; ++r) island.p.lower(offset + r, c) = rows(r, c);
   }
   island.p.AddBlock(offset, rows.middleCols(at, kPoseDim));
-  anchors_.push_back(
-      {next_anchor_, block, 0, island.updates, robot.motion.world_from_camera, robot.first_pose});
-  return next_anchor_++;
+  clones_.push_back(
+      {next_clone_, block, 0, island.updates, robot.motion.world_from_camera, robot.first_pose});
+  return next_clone_++;
 }
 
-AnchorPoseId FilterState::AddAnchor(const Rigid3& world_from_camera, const Matrix6d& covariance,
-                                    RobotId robot) {
+CloneId FilterState::AddClone(const Rigid3& world_from_camera, const Matrix6d& covariance,
+                              RobotId robot) {
   const int number = IslandOf(Of(robot).block);
   Island& island = IslandAt(number);
   const BlockId block = Append(BlockKind::kClone, kPoseDim, number);
-  if (island.mark) island.mark->journal.Add(Journal::Appended{kPoseDim});
+  if (island.checkpoint) island.checkpoint->journal.Add(Journal::Appended{kPoseDim});
   island.p.AddBlock(At(block), covariance);
   // Not young: its features have been measured often.
-  anchors_.push_back({next_anchor_, block, 0, 0, world_from_camera, world_from_camera});
-  return next_anchor_++;
+  clones_.push_back({next_clone_, block, 0, 0, world_from_camera, world_from_camera});
+  return next_clone_++;
 }
 
-absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& birth) {
-  const auto at = std::ranges::lower_bound(anchors_, anchor, {}, &Anchor::id);
-  if (at == anchors_.end() || at->id != anchor) {
-    return absl::InvalidArgumentError(absl::StrCat("filter: no pose clone ", anchor));
+absl::Status FilterState::AddFeature(CloneId clone, const FeatureBirth& birth) {
+  const auto at = std::ranges::lower_bound(clones_, clone, {}, &Clone::id);
+  if (at == clones_.end() || at->id != clone) {
+    return absl::InvalidArgumentError(absl::StrCat("filter: no pose clone ", clone));
   }
   if (Has(birth.id)) {
     return absl::InvalidArgumentError(absl::StrCat("filter: feature id ", birth.id, " is taken"));
@@ -59,14 +59,14 @@ absl::Status FilterState::AddFeature(AnchorPoseId anchor, const FeatureBirth& bi
   }
   Feature feature;
   feature.id = birth.id;
-  feature.anchor = anchor;
+  feature.clone = clone;
   feature.point = feature.first = {birth.bearing, TangentBasis(birth.bearing), birth.inverse_range};
   const Eigen::Matrix<double, 3, 2>& basis = feature.point.basis;
   feature.birth_covariance = basis.transpose() * birth.bearing_covariance * basis;
   const int number = IslandOf(at->block);
   Island& island = IslandAt(number);
   feature.block = Append(BlockKind::kFeature, form_->dim(), number);
-  if (island.mark) island.mark->journal.Add(Journal::Appended{form_->dim()});
+  if (island.checkpoint) island.checkpoint->journal.Add(Journal::Appended{form_->dim()});
   island.p.AddBlock(At(feature.block),
                     form_->BirthCovariance(feature.birth_covariance, birth.inverse_range_sigma));
   features_.insert(std::ranges::upper_bound(features_, birth.id, {}, &Feature::id), feature);
@@ -80,13 +80,13 @@ void FilterState::Remove(std::span<const FeatureId> ids) {
     const Feature* found = Find(id);
     if (found == nullptr) continue;
     gone.push_back(found->block);
-    for (Anchor& anchor : anchors_) anchor.users -= anchor.id == found->anchor ? 1 : 0;
+    for (Clone& clone : clones_) clone.users -= clone.id == found->clone ? 1 : 0;
     features_.erase(features_.begin() + (found - features_.data()));
   }
-  for (const Anchor& anchor : anchors_) {
-    if (anchor.users == 0) gone.push_back(anchor.block);
+  for (const Clone& clone : clones_) {
+    if (clone.users == 0) gone.push_back(clone.block);
   }
-  std::erase_if(anchors_, [](const Anchor& anchor) { return anchor.users == 0; });
+  std::erase_if(clones_, [](const Clone& clone) { return clone.users == 0; });
   RemoveBlocks(gone);
 }
 
@@ -99,7 +99,7 @@ void FilterState::RemoveBlocks(std::span<const BlockId> gone) {
     Island& island = IslandAt(number);
     std::vector<int> keep = layout_.Remove(number, here);
     island.p.Keep(keep);
-    if (island.mark) island.mark->journal.Add(Journal::Kept{std::move(keep)});
+    if (island.checkpoint) island.checkpoint->journal.Add(Journal::Kept{std::move(keep)});
   }
 }
 
@@ -109,12 +109,12 @@ void FilterState::Join(int into, int from) {
   Island& other = IslandAt(from);
   // Clones keep their age.
   const int updates = std::max(island.updates, other.updates);
-  for (Anchor& anchor : In(into, anchors_)) anchor.born += updates - island.updates;
-  for (Anchor& anchor : In(from, anchors_)) anchor.born += updates - other.updates;
+  for (Clone& clone : In(into, clones_)) clone.born += updates - island.updates;
+  for (Clone& clone : In(from, clones_)) clone.born += updates - other.updates;
   layout_.Join(into, from);
   island.p.Append(other.p);
   island.updates = updates;
-  island.mark.reset();
+  island.checkpoint.reset();
   other = Island();
 }
 

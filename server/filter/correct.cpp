@@ -30,8 +30,8 @@ void FilterState::CarryScale(const VectorXd& step, int number) {
     d.segment(at, size) = robot.model->OfScale(step.segment(at, size));
   }
   if (!Fej(number)) {
-    for (const Anchor& anchor : In(number, anchors_)) {
-      d.segment<3>(At(anchor.block)) = step.segment<3>(At(anchor.block));
+    for (const Clone& clone : In(number, clones_)) {
+      d.segment<3>(At(clone.block)) = step.segment<3>(At(clone.block));
     }
   }
   island.p.TransformRankOne(d, w);
@@ -52,9 +52,9 @@ void FilterState::Correct(const VectorXd& error, int number) {
     carry(at + 3);
     if (robot.readout != kNoBlock) robot.readout_s += error[At(robot.readout)];
   }
-  for (Anchor& anchor : In(number, anchors_)) {
-    anchor.pose = PlusPose(anchor.pose, error.segment<6>(At(anchor.block)));
-    carry(At(anchor.block) + 3);
+  for (Clone& clone : In(number, clones_)) {
+    clone.pose = PlusPose(clone.pose, error.segment<6>(At(clone.block)));
+    carry(At(clone.block) + 3);
   }
   for (Feature& feature : In(number, features_)) {
     form_->Move(error.segment(At(feature.block), form_->dim()), feature.point);

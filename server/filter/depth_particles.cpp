@@ -44,14 +44,14 @@ bool DepthParticles::WorthAttempt(const Eigen::Vector3d& velocity_m_s) const {
 
 void DepthParticles::Predict(const CameraModel& camera, const DepthLine& line,
                              const Eigen::Matrix2d& noise) {
-  AnchoredPoint point = line.line;
+  PointFromClone point = line.line;
   Eigen::Matrix<double, 2, 14> h;
   for (DepthParticle& particle : particles_) {
     point.inverse_range = 1.0 / particle.range_m;
-    const auto at = PredictAnchored(camera, line.world_from_camera, point);
+    const auto at = PredictFromClone(camera, line.world_from_camera, point);
     particle.pixel.reset();
     if (!at || !camera.InImage(at->pixel)) continue;
-    h << at->d_camera, at->d_anchor, at->d_point.leftCols<2>();
+    h << at->d_camera, at->d_clone, at->d_point.leftCols<2>();
     particle.pixel = at->pixel;
     particle.covariance = h * line.covariance * h.transpose() + noise;
   }

@@ -27,7 +27,7 @@ struct DepthParticleOptions {
 /// What the filter knows of a line of sight whose range it does not know: a bearing in a pose
 /// clone.
 struct DepthLine {
-  AnchoredPoint line;  // its inverse_range is not looked at
+  PointFromClone line;  // its inverse_range is not looked at
   Rigid3 world_from_camera;
   /// Joint covariance of [camera position, rotation | clone position, rotation | bearing tangent].
   Eigen::Matrix<double, 14, 14> covariance = Eigen::Matrix<double, 14, 14>::Zero();
@@ -71,7 +71,7 @@ class DepthParticles {
   int attempts() const { return attempts_; }
   double range_m() const;        // weighted mean
   double range_sigma_m() const;  // the spacing of the particles counts in
-  /// The same for 1 / range, as AnchoredPoint has it.
+  /// The same for 1 / range, as PointFromClone has it.
   double inverse_range() const;
   double inverse_range_sigma() const;
 

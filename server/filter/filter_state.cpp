@@ -15,10 +15,10 @@ void FilterState::Reset(const CameraMotion& camera, const Matrix12d& covariance)
   layout_.Clear();
   islands_.clear();
   robots_.clear();
-  anchors_.clear();
+  clones_.clear();
   features_.clear();
   next_robot_ = kFirstRobot;
-  next_anchor_ = 1;
+  next_clone_ = 1;
   AddRobot(camera, covariance,
            {.readout_s = options_.readout_s, .readout_sigma_s = options_.readout_sigma_s});
 }
@@ -47,7 +47,7 @@ RobotId FilterState::AddRobot(const CameraMotion& camera, const Matrix12d& covar
 void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covariance, RobotId id) {
   Robot& robot = Of(id);
   Island& island = IslandAt(IslandOf(robot.block));
-  island.mark.reset();
+  island.checkpoint.reset();
   robot.head = HeadRate();
   robot.motion = camera;
   robot.first_pose = camera.world_from_camera;
@@ -59,7 +59,7 @@ void FilterState::RemoveRobot(RobotId id) {
   const Robot& robot = Of(id);
   std::vector<BlockId> gone = {robot.block};
   if (robot.readout != kNoBlock) gone.push_back(robot.readout);
-  IslandAt(IslandOf(robot.block)).mark.reset();
+  IslandAt(IslandOf(robot.block)).checkpoint.reset();
   RemoveBlocks(gone);
   std::erase_if(robots_, [&](const Robot& each) { return each.id == id; });
 }
@@ -113,15 +113,15 @@ const FilterState::Feature* FilterState::Find(FeatureId id) const {
   return at != features_.end() && at->id == id ? &*at : nullptr;
 }
 
-const FilterState::Anchor* FilterState::FindAnchor(AnchorPoseId id) const {
-  const auto at = std::ranges::lower_bound(anchors_, id, {}, &Anchor::id);
-  return at != anchors_.end() && at->id == id ? &*at : nullptr;
+const FilterState::Clone* FilterState::FindClone(CloneId id) const {
+  const auto at = std::ranges::lower_bound(clones_, id, {}, &Clone::id);
+  return at != clones_.end() && at->id == id ? &*at : nullptr;
 }
 
-std::optional<Rigid3> FilterState::AnchorPose(AnchorPoseId id) const {
-  const Anchor* anchor = FindAnchor(id);
-  if (anchor == nullptr) return std::nullopt;
-  return anchor->pose;
+std::optional<Rigid3> FilterState::ClonePose(CloneId id) const {
+  const Clone* clone = FindClone(id);
+  if (clone == nullptr) return std::nullopt;
+  return clone->pose;
 }
 
 }  // namespace saccade

@@ -49,9 +49,9 @@ class FilterState {
   bool HasRobot(RobotId robot) const;
 
   /// Forgets everything and takes a map over, as one whose first troubles are behind it; the camera
-  /// shares no knowledge with it yet. Ids of the clones, in the order of `seed.anchors`.
-  std::vector<AnchorPoseId> Seed(const MapSeed& seed, const CameraMotion& camera,
-                                 const Matrix12d& covariance);
+  /// shares no knowledge with it yet. Ids of the clones, in the order of `seed.clones`.
+  std::vector<CloneId> Seed(const MapSeed& seed, const CameraMotion& camera,
+                            const Matrix12d& covariance);
 
   const FilterOptions& options() const { return options_; }
   int dim() const { return layout_.dim(); }
@@ -68,11 +68,11 @@ class FilterState {
   Eigen::MatrixXd FullCovariance() const;
 
   std::size_t feature_count() const { return features_.size(); }
-  std::size_t anchor_count() const { return anchors_.size(); }
+  std::size_t clone_count() const { return clones_.size(); }
   bool Has(FeatureId id) const { return Find(id) != nullptr; }
   std::vector<FeatureId> FeatureIds() const;
   /// The feature as it stands. `id` must exist.
-  AnchoredPoint Point(FeatureId id) const;
+  PointFromClone Point(FeatureId id) const;
   /// `covariance_in_camera` is that of `robot`.
   FeatureMarginal Marginal(FeatureId id, RobotId robot = kFirstRobot) const;
 
@@ -87,14 +87,14 @@ class FilterState {
   void Inflate(const Matrix12d& extra, RobotId robot = kFirstRobot);
 
   /// Clones the camera's pose into the state, fully correlated.
-  AnchorPoseId AddAnchor(RobotId robot = kFirstRobot);
+  CloneId AddClone(RobotId robot = kFirstRobot);
   /// Puts a pose into the state that a camera once had and that is known from elsewhere, with an
   /// error of its own: covariance (6 x 6) of [position (world), rotation (local)]. It enters the
   /// island of `robot`.
-  AnchorPoseId AddAnchor(const Rigid3& world_from_camera, const Matrix6d& covariance,
-                         RobotId robot = kFirstRobot);
-  /// Starts a feature in a clone. InvalidArgument: unknown anchor, id taken, numbers not usable.
-  absl::Status AddFeature(AnchorPoseId anchor, const FeatureBirth& birth);
+  CloneId AddClone(const Rigid3& world_from_camera, const Matrix6d& covariance,
+                   RobotId robot = kFirstRobot);
+  /// Starts a feature in a clone. InvalidArgument: unknown clone, id taken, numbers not usable.
+  absl::Status AddFeature(CloneId clone, const FeatureBirth& birth);
   /// Removes features (unknown ids are ignored), and the clones that then carry none.
   void Remove(std::span<const FeatureId> ids);
 
@@ -118,17 +118,17 @@ class FilterState {
                                       const Rigid3& linearisation, RobotId robot = kFirstRobot);
 
   /// The clone that a feature hangs on. `id` must exist.
-  AnchorPoseId AnchorOf(FeatureId id) const { return Find(id)->anchor; }
+  CloneId CloneOf(FeatureId id) const { return Find(id)->clone; }
   /// Nothing if it is not in the state any more.
-  std::optional<Rigid3> AnchorPose(AnchorPoseId id) const;
+  std::optional<Rigid3> ClonePose(CloneId id) const;
   /// Remembers the present estimates of a robot's island, and from now on what happens to their
   /// errors, until the island is joined with another.
-  void Mark(RobotId robot = kFirstRobot);
-  void DropMark(RobotId robot = kFirstRobot);
-  /// Moves the estimates of the mark to better ones, found elsewhere from the same measurements
-  /// (docs/derivations/bundle-adjustment.md), and the present ones to where they would be had that
-  /// been known then. The covariance is carried along, neither smaller nor larger. Ends the mark;
-  /// does nothing without one.
+  void SetCheckpoint(RobotId robot = kFirstRobot);
+  void DropCheckpoint(RobotId robot = kFirstRobot);
+  /// Moves the estimates of the checkpoint to better ones, found elsewhere from the same
+  /// measurements (docs/derivations/bundle-adjustment.md), and the present ones to where they would
+  /// be had that been known then. The covariance is carried along, neither smaller nor larger. Ends
+  /// the checkpoint; does nothing without one.
   void Refine(const Refinement& refinement, RobotId robot = kFirstRobot);
 
   /// From here on errors are counted from this clone: its pose defines the world, and has no error
@@ -136,15 +136,15 @@ class FilterState {
   /// uncertainty of one thing seen from another. Of its island alone. False, and nothing is done:
   /// the clone is unknown, or Jacobians are at first estimates, which learn nothing of where the
   /// world is. O(n^2).
-  bool CountErrorsFrom(AnchorPoseId anchor);
+  bool CountErrorsFrom(CloneId clone);
 
   /// Everything in the robot's island is somewhere else in a world that is turned, moved and of
   /// another scale: the same state in other coordinates, to the last correlation
-  /// (docs/derivations/gauge.md). Ends the mark. O(n^2).
+  /// (docs/derivations/gauge.md). Ends the checkpoint. O(n^2).
   void MoveWorld(const Similarity3& world_from_before, RobotId robot = kFirstRobot);
 
   /// How surely a clone's direction is known from where errors are counted [rad]; unknown: 0.
-  double DirectionSigma(AnchorPoseId anchor) const;
+  double DirectionSigma(CloneId clone) const;
 
   /// Removes features whose inverse range is negative by two sigma; returns them.
   std::vector<FeatureId> RemoveBehind();
@@ -166,8 +166,8 @@ class FilterState {
     int judged = 0;            // updates that told of the noise
     double noise_scale = 1.0;  // of matches' errors against their R, squared; up to 1
   };
-  struct Anchor {
-    AnchorPoseId id = 0;
+  struct Clone {
+    CloneId id = 0;
     BlockId block = kNoBlock;
     int users = 0;
     int born = 0;  // updates before it
@@ -177,15 +177,15 @@ class FilterState {
   struct Feature {
     FeatureId id = 0;
     BlockId block = kNoBlock;
-    AnchorPoseId anchor = 0;
+    CloneId clone = 0;
     PointInClone point, first;
     Eigen::Matrix2d birth_covariance = Eigen::Matrix2d::Zero();  // of the bearing, as first seen
   };
   /// Estimates as they were, and how their errors have changed since.
-  struct Marked {
+  struct Checkpoint {
     StateLayout layout;
     Robot robot;
-    std::vector<Anchor> anchors;
+    std::vector<Clone> clones;
     std::vector<Feature> features;
     Journal journal;
   };
@@ -193,7 +193,7 @@ class FilterState {
   struct Island {
     Covariance p;
     int updates = 0;  // since it began
-    std::optional<Marked> mark;
+    std::optional<Checkpoint> checkpoint;
   };
   /// Sparse measurement model of one frame: two rows an observation, three blocks each.
   struct Linearised {
@@ -217,8 +217,8 @@ class FilterState {
   Robot& Of(RobotId id);
   const Robot& Of(RobotId id) const;
   const Feature* Find(FeatureId id) const;
-  const Anchor* FindAnchor(AnchorPoseId id) const;
-  const Anchor& AnchorOf(const Feature& feature) const { return *FindAnchor(feature.anchor); }
+  const Clone* FindClone(CloneId id) const;
+  const Clone& CloneOf(const Feature& feature) const { return *FindClone(feature.clone); }
   int At(BlockId id) const { return layout_[id].offset; }
   int IslandOf(BlockId id) const { return layout_[id].island; }
   Island& IslandAt(int island) { return islands_[static_cast<std::size_t>(island)]; }
@@ -241,13 +241,13 @@ class FilterState {
   void ChangeVelocities(double sign, Robot& robot);
 
   // Where things are seen: prediction.cpp.
-  AnchoredPoint Point(const Feature& feature, bool first) const;
+  PointFromClone Point(const Feature& feature, bool first) const;
   /// Pixel at the current estimates, Jacobians where the options say.
   std::optional<PixelPrediction> Linearise(const CameraModel& camera, const Robot& robot,
                                            const Feature& feature) const;
   /// Covariance of [camera pose, clone, point].
   using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 15, 15>;
-  SmallMatrix Gather(const Robot& robot, const Anchor& anchor, const Feature& feature) const;
+  SmallMatrix Gather(const Robot& robot, const Clone& clone, const Feature& feature) const;
 
   // Measurement model: linearise.cpp.
   absl::Status JoinSeen(std::span<const Observation> observations, RobotId robot);
@@ -263,7 +263,7 @@ class FilterState {
   /// From the estimates to where they are linearised: the camera at `linearisation`, everything
   /// else where the filter expects it then.
   Eigen::VectorXd StepTo(const Rigid3& linearisation, const Robot& robot) const;
-  AnchoredPoint MovedPoint(const Feature& feature, const Eigen::VectorXd& step) const;
+  PointFromClone MovedPoint(const Feature& feature, const Eigen::VectorXd& step) const;
   std::vector<Turned> ExplainByTurning(const CameraModel& camera,
                                        std::span<const Observation> observations,
                                        const Rigid3& linearisation) const;
@@ -290,10 +290,10 @@ class FilterState {
   StateLayout layout_;
   std::vector<Island> islands_;
   std::vector<Robot> robots_;      // rising ids
-  std::vector<Anchor> anchors_;    // rising ids
+  std::vector<Clone> clones_;      // rising ids
   std::vector<Feature> features_;  // rising ids
   RobotId next_robot_ = kFirstRobot;
-  AnchorPoseId next_anchor_ = 1;
+  CloneId next_clone_ = 1;
 };
 
 }  // namespace saccade

@@ -13,7 +13,7 @@
 // What enters FilterState and leaves it.
 namespace saccade {
 
-using AnchorPoseId = std::uint32_t;
+using CloneId = std::uint32_t;
 /// A moving camera of the state. The first is there from the start.
 using RobotId = std::uint32_t;
 inline constexpr RobotId kFirstRobot = 0;
@@ -49,7 +49,7 @@ struct FeatureMarginal {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();        // [m]
   Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();   // [m^2]
   Eigen::Matrix3d covariance_in_camera = Eigen::Matrix3d::Zero();  // cross terms included [m^2]
-  double inverse_range = 0.0, inverse_range_sigma = 0.0;           // from the anchor [1/m]
+  double inverse_range = 0.0, inverse_range_sigma = 0.0;           // from the clone [1/m]
 };
 
 struct UpdateReport {
@@ -57,30 +57,30 @@ struct UpdateReport {
   double nis = 0.0;  // r^T S^-1 r, of `rows` degrees of freedom
 };
 
-/// Estimates that are better than the filter's were at its mark.
+/// Estimates that are better than the filter's were at its checkpoint.
 struct Refinement {
   struct Feature {
     Eigen::Vector3d bearing;  // unit, in its clone
     double inverse_range;     // [1/m]
   };
-  std::map<AnchorPoseId, Rigid3> anchors;
+  std::map<CloneId, Rigid3> clones;
   std::map<FeatureId, Feature> features;
-  std::optional<Rigid3> world_from_camera;  // of the robot, at the mark
+  std::optional<Rigid3> world_from_camera;  // of the robot, at the checkpoint
 };
 
 /// A map that was found elsewhere, from the same pictures, for an empty filter.
 struct MapSeed {
   struct Feature {
     FeatureId id = 0;                                            // rising
-    int anchor = 0;                                              // index into `anchors`
-    Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();          // unit, in the anchor
+    int clone = 0;                                               // index into `clones`
+    Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();          // unit, in the clone
     Eigen::Matrix2d birth_covariance = Eigen::Matrix2d::Zero();  // of one match there [rad^2]
     double inverse_range = 1.0;                                  // [1/m]
   };
-  std::vector<Rigid3> anchors;  // world from camera, in order of time
+  std::vector<Rigid3> clones;  // world from camera, in order of time
   std::vector<Feature> features;
   double readout_s = 0.0;
-  /// Of [read-out | 6 of each anchor | 3 of each feature, tangent by TangentBasis].
+  /// Of [read-out | 6 of each clone | 3 of each feature, tangent by TangentBasis].
   Eigen::MatrixXd covariance;
 };
 

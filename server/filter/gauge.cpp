@@ -6,8 +6,8 @@
 
 namespace saccade {
 
-bool FilterState::CountErrorsFrom(AnchorPoseId id) {
-  const Anchor* from = FindAnchor(id);
+bool FilterState::CountErrorsFrom(CloneId id) {
+  const Clone* from = FindClone(id);
   if (from == nullptr || Fej(IslandOf(from->block))) return false;
   const int number = IslandOf(from->block);
   Covariance& p = IslandAt(number).p;
@@ -16,18 +16,18 @@ bool FilterState::CountErrorsFrom(AnchorPoseId id) {
     robot.model->ByOrigin(robot.motion, from->pose,
                           moved.middleRows(At(robot.block), robot.model->dim()));
   }
-  for (const Anchor& each : In(number, anchors_)) {
+  for (const Clone& each : In(number, clones_)) {
     PoseByOrigin(each.pose, from->pose, moved.middleRows<kPoseDim>(At(each.block)));
   }
   p.Condition(moved, At(from->block));
   return true;
 }
 
-double FilterState::DirectionSigma(AnchorPoseId id) const {
-  const Anchor* anchor = FindAnchor(id);
-  if (anchor == nullptr) return 0.0;
-  const Covariance& p = IslandAt(IslandOf(anchor->block)).p;
-  const int at = At(anchor->block);
+double FilterState::DirectionSigma(CloneId id) const {
+  const Clone* clone = FindClone(id);
+  if (clone == nullptr) return 0.0;
+  const Covariance& p = IslandAt(IslandOf(clone->block)).p;
+  const int at = At(clone->block);
   double variance = 0.0;
   for (int k = 3; k < kPoseDim; ++k) variance += p.at(at + k, at + k);
   return std::sqrt(std::max(0.0, variance / 3.0));
@@ -36,7 +36,7 @@ double FilterState::DirectionSigma(AnchorPoseId id) const {
 void FilterState::MoveWorld(const Similarity3& world_from_before, RobotId id) {
   const int number = IslandOf(Of(id).block);
   Island& island = IslandAt(number);
-  island.mark.reset();
+  island.checkpoint.reset();
   const double scale = world_from_before.scale;
   const Eigen::Matrix3d turn = scale * world_from_before.rotation.toRotationMatrix();
   Matrix6d by = Matrix6d::Identity();  // of a pose
@@ -51,10 +51,10 @@ void FilterState::MoveWorld(const Similarity3& world_from_before, RobotId id) {
       robot.head->covariance = (by * robot.head->covariance * by.transpose()).eval();
     }
   }
-  for (Anchor& anchor : In(number, anchors_)) {
-    anchor.pose = world_from_before.Move(anchor.pose);
-    anchor.first = world_from_before.Move(anchor.first);
-    island.p.TransformBlock(At(anchor.block), by);
+  for (Clone& clone : In(number, clones_)) {
+    clone.pose = world_from_before.Move(clone.pose);
+    clone.first = world_from_before.Move(clone.first);
+    island.p.TransformBlock(At(clone.block), by);
   }
   for (Feature& feature : In(number, features_)) {
     feature.point.inverse_range /= scale;

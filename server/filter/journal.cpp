@@ -20,8 +20,8 @@ VectorXd Apply(const Journal::Updated& update, VectorXd step) {
     const Journal::Updated::Rows& rows = update.rows[k];
     Eigen::Vector2d sum = rows.d_camera * step.segment<kPoseDim>(rows.camera);
     if (rows.readout >= 0) sum += rows.d_readout * step[rows.readout];
-    if (rows.anchor >= 0) {
-      sum += rows.d_anchor * step.segment<kPoseDim>(rows.anchor) +
+    if (rows.clone >= 0) {
+      sum += rows.d_clone * step.segment<kPoseDim>(rows.clone) +
              rows.d_point * step.segment(rows.point, rows.d_point.cols());
     }
     seen.segment<2>(2 * static_cast<Eigen::Index>(k)) = sum;

@@ -11,8 +11,8 @@ namespace saccade {
 /// A pixel's Jacobian by what of a point is in the state.
 using PointColumns = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 3>;
 
-/// What happened to the errors of an island of the state since a mark: enough to carry a correction
-/// that is found late on to the present, as if it had been known at the mark.
+/// What happened to the errors of an island of the state since a checkpoint: enough to carry a
+/// correction that is found late on to the present, as if it had been known at the checkpoint.
 ///
 /// An update turns an error e into e - K H e, a prediction the camera's into F e; elements come and
 /// go. Carrying a correction through costs O(n m) an update, n numbers, m measurement rows. A
@@ -26,8 +26,8 @@ class Journal {
     Eigen::MatrixXd factor;  // m x m, lower triangle; or empty
     /// H e, from an error e (n) to m numbers.
     struct Rows {
-      int camera = 0, anchor = -1, point = -1, readout = -1;  // offsets
-      Eigen::Matrix<double, 2, 6> d_camera, d_anchor;
+      int camera = 0, clone = -1, point = -1, readout = -1;  // offsets
+      Eigen::Matrix<double, 2, 6> d_camera, d_clone;
       PointColumns d_point;
       Eigen::Vector2d d_readout;
     };
@@ -50,7 +50,7 @@ class Journal {
 
   void Add(Entry entry) { entries_.push_back(std::move(entry)); }
   std::size_t size() const { return entries_.size(); }
-  /// `step` in the state at the mark to a step in the present one.
+  /// `step` in the state at the checkpoint to a step in the present one.
   Eigen::VectorXd Carry(Eigen::VectorXd step) const;
 
  private:

@@ -51,33 +51,33 @@ VectorXd FilterState::StepTo(const Rigid3& linearisation, const Robot& robot) co
   return step;
 }
 
-AnchoredPoint FilterState::MovedPoint(const Feature& feature, const VectorXd& step) const {
-  const Anchor& anchor = AnchorOf(feature);
+PointFromClone FilterState::MovedPoint(const Feature& feature, const VectorXd& step) const {
+  const Clone& clone = CloneOf(feature);
   PointInClone point = feature.point;
   form_->Move(step.segment(At(feature.block), form_->dim()), point);
-  return {PlusPose(anchor.pose, step.segment<6>(At(anchor.block))), point.bearing, point.basis,
+  return {PlusPose(clone.pose, step.segment<6>(At(clone.block))), point.bearing, point.basis,
           point.inverse_range};
 }
 
 std::optional<PixelPrediction> FilterState::LineariseOne(
     const CameraModel& camera, const Feature& feature, const Rigid3& linearisation,
     const VectorXd& step, Linearised::Rows& rows, Eigen::Vector2d& ahead) const {
-  auto at = PredictAnchored(camera, linearisation, MovedPoint(feature, step));
+  auto at = PredictFromClone(camera, linearisation, MovedPoint(feature, step));
   if (!at) return at;
   const bool fej = Fej(IslandOf(feature.block));
   if (fej) {
-    if (const auto first = PredictAnchored(camera, linearisation, Point(feature, true))) {
+    if (const auto first = PredictFromClone(camera, linearisation, Point(feature, true))) {
       at->d_camera = first->d_camera;
-      at->d_anchor = first->d_anchor;
+      at->d_clone = first->d_clone;
       at->d_point = first->d_point;
     }
   }
-  rows.anchor = At(AnchorOf(feature).block);
+  rows.clone = At(CloneOf(feature).block);
   rows.point = At(feature.block);
   if (!fej) {
-    at->d_anchor.rightCols<3>() *= RightJacobianSo3(step.segment<3>(rows.anchor + 3)).eval();
+    at->d_clone.rightCols<3>() *= RightJacobianSo3(step.segment<3>(rows.clone + 3)).eval();
   }
-  ahead = at->d_anchor * step.segment<6>(rows.anchor) +
+  ahead = at->d_clone * step.segment<6>(rows.clone) +
           form_->InState(at->d_point) * step.segment(rows.point, form_->dim());
   const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
   rows.noise += d_bearing * form_->Frozen(feature.birth_covariance) * d_bearing.transpose();
@@ -108,7 +108,7 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
     if (!at) return NotInView(observation.id);
     rows.d_camera = at->d_camera;
     rows.d_camera.rightCols<3>() = at->d_camera.rightCols<3>() * turn;
-    rows.d_anchor = at->d_anchor;
+    rows.d_clone = at->d_clone;
     rows.d_point = form_->InState(at->d_point);
     if (all.readout >= 0) ahead += rows.d_readout * step[all.readout];
     all.innovation.segment<2>(2 * static_cast<Eigen::Index>(k)) =
@@ -120,25 +120,25 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
 std::vector<FilterState::Turned> FilterState::ExplainByTurning(
     const CameraModel& camera, std::span<const Observation> observations,
     const Rigid3& linearisation) const {
-  std::map<AnchorPoseId, std::vector<TurnResidual>> residuals;
-  std::map<AnchorPoseId, Turned> turned;
+  std::map<CloneId, std::vector<TurnResidual>> residuals;
+  std::map<CloneId, Turned> turned;
   for (const Observation& observation : observations) {
     if (observation.known_point) continue;
     const Feature& feature = *Find(observation.id);
-    const Anchor& anchor = AnchorOf(feature);
+    const Clone& clone = CloneOf(feature);
     // As first seen: bearings that were corrected since may have taken up some parallax.
-    AnchoredPoint far = Point(feature, true);
-    far.world_from_anchor = anchor.pose;
+    PointFromClone far = Point(feature, true);
+    far.world_from_clone = clone.pose;
     far.inverse_range = 0.0;
-    const auto at = PredictAnchored(camera, linearisation, far);
+    const auto at = PredictFromClone(camera, linearisation, far);
     if (!at) continue;
     const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
-    residuals[feature.anchor].push_back(
+    residuals[feature.clone].push_back(
         {observation.pixel - at->pixel, at->d_camera.rightCols<3>(),
          observation.noise + d_bearing * feature.birth_covariance * d_bearing.transpose()});
-    const int updates = IslandAt(IslandOf(anchor.block)).updates;
-    turned[feature.anchor].age = updates - anchor.born;
-    turned[feature.anchor].ranges.push_back(At(feature.block) + form_->range());
+    const int updates = IslandAt(IslandOf(clone.block)).updates;
+    turned[feature.clone].age = updates - clone.born;
+    turned[feature.clone].ranges.push_back(At(feature.block) + form_->range());
   }
   std::vector<Turned> all;
   for (auto& [id, each] : turned) {

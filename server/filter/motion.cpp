@@ -40,7 +40,7 @@ CameraMotion FilterState::WholeMotion(RobotId id) const {
 void FilterState::Follow(const MotionModel::Step& step, Robot& robot) {
   Island& island = IslandAt(IslandOf(robot.block));
   const int at = At(robot.block);
-  if (island.mark) island.mark->journal.Add(Journal::Predicted{at, step.f});
+  if (island.checkpoint) island.checkpoint->journal.Add(Journal::Predicted{at, step.f});
   island.p.TransformBlock(at, step.f);
   island.p.AddBlock(at, step.q);
   robot.motion = step.next;

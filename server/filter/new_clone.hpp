@@ -8,15 +8,15 @@ namespace saccade {
 /// object if none was.
 class NewClone {
  public:
-  explicit NewClone(FilterState& filter) : filter_(filter), id_(filter.AddAnchor()) {}
+  explicit NewClone(FilterState& filter) : filter_(filter), id_(filter.AddClone()) {}
   ~NewClone() { filter_.Remove({}); }
   NewClone(const NewClone&) = delete;
   NewClone& operator=(const NewClone&) = delete;
-  AnchorPoseId id() const { return id_; }
+  CloneId id() const { return id_; }
 
  private:
   FilterState& filter_;
-  const AnchorPoseId id_;
+  const CloneId id_;
 };
 
 }  // namespace saccade

@@ -29,16 +29,16 @@ void MoveBearing(const Vector2d& error, Vector3d& bearing, Eigen::Matrix<double,
   basis.col(1) = bearing.cross(basis.col(0));
 }
 
-std::optional<PixelPrediction> PredictAnchored(const CameraModel& camera,
-                                               const Rigid3& world_from_camera,
-                                               const AnchoredPoint& point) {
+std::optional<PixelPrediction> PredictFromClone(const CameraModel& camera,
+                                                const Rigid3& world_from_camera,
+                                                const PointFromClone& point) {
   const Matrix3d camera_from_world = world_from_camera.rotation.conjugate().toRotationMatrix();
-  const Matrix3d camera_from_anchor =
-      camera_from_world * point.world_from_anchor.rotation.toRotationMatrix();
+  const Matrix3d camera_from_clone =
+      camera_from_world * point.world_from_clone.rotation.toRotationMatrix();
   const Vector3d base =
-      camera_from_world * (point.world_from_anchor.translation - world_from_camera.translation);
+      camera_from_world * (point.world_from_clone.translation - world_from_camera.translation);
   PixelPrediction result;
-  result.ray = camera_from_anchor * point.bearing + point.inverse_range * base;
+  result.ray = camera_from_clone * point.bearing + point.inverse_range * base;
   Eigen::Matrix<double, 2, 3> d_ray;
   const auto pixel = camera.Project(result.ray, &d_ray);
   if (!pixel) return std::nullopt;
@@ -46,9 +46,9 @@ std::optional<PixelPrediction> PredictAnchored(const CameraModel& camera,
   const Eigen::Matrix<double, 2, 3> d_position = point.inverse_range * (d_ray * camera_from_world);
   result.d_camera.leftCols<3>() = -d_position;
   result.d_camera.rightCols<3>() = d_ray * Skew(result.ray);
-  const Eigen::Matrix<double, 2, 3> d_bearing = d_ray * camera_from_anchor;
-  result.d_anchor.leftCols<3>() = d_position;
-  result.d_anchor.rightCols<3>() = -d_bearing * Skew(point.bearing);
+  const Eigen::Matrix<double, 2, 3> d_bearing = d_ray * camera_from_clone;
+  result.d_clone.leftCols<3>() = d_position;
+  result.d_clone.rightCols<3>() = -d_bearing * Skew(point.bearing);
   result.d_point.leftCols<2>() = d_bearing * point.basis;
   result.d_point.col(2) = d_ray * base;
   return result;
@@ -66,17 +66,17 @@ std::optional<PixelPrediction> PredictFixed(const CameraModel& camera,
   result.pixel = *pixel;
   result.d_camera.leftCols<3>() = -d_ray * camera_from_world;
   result.d_camera.rightCols<3>() = d_ray * Skew(result.ray);
-  result.d_anchor.setZero();
+  result.d_clone.setZero();
   result.d_point.setZero();
   return result;
 }
 
-std::optional<Vector2d> PixelOfAnchored(const CameraModel& camera, const Rigid3& world_from_camera,
-                                        const AnchoredPoint& point) {
-  return camera.Project(world_from_camera.rotation.conjugate() *
-                        (point.world_from_anchor.rotation * point.bearing +
-                         point.inverse_range * (point.world_from_anchor.translation -
-                                                world_from_camera.translation)));
+std::optional<Vector2d> PixelFromClone(const CameraModel& camera, const Rigid3& world_from_camera,
+                                       const PointFromClone& point) {
+  return camera.Project(
+      world_from_camera.rotation.conjugate() *
+      (point.world_from_clone.rotation * point.bearing +
+       point.inverse_range * (point.world_from_clone.translation - world_from_camera.translation)));
 }
 
 }  // namespace saccade

@@ -22,10 +22,10 @@ struct PointInClone {
   double inverse_range = 1.0;               // [1/m]; may be slightly below 0 while uncertain
 };
 
-/// A point seen from an anchor pose: direction and inverse range there.
-struct AnchoredPoint {
-  Rigid3 world_from_anchor;
-  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // unit, in the anchor
+/// A point seen from a clone: direction and inverse range there.
+struct PointFromClone {
+  Rigid3 world_from_clone;
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  // unit, in the clone
   Eigen::Matrix<double, 3, 2> basis =
       Eigen::Matrix<double, 3, 2>::Zero();  // tangent of the bearing: b [+] d
   double inverse_range = 1.0;               // [1/m]; may be slightly below 0 while uncertain
@@ -42,25 +42,25 @@ void MoveBearing(const Eigen::Vector2d& error, Eigen::Vector3d& bearing,
 /// Where a point appears, and how that depends on everything.
 struct PixelPrediction {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // [px, distorted]
-  /// Direction of the point in the camera, scaled: X = R b + rho t for anchored points [1],
+  /// Direction of the point in the camera, scaled: X = R b + rho t for points of clones [1],
   /// the point itself for fixed ones [m].
   Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();
   Eigen::Matrix<double, 2, 6> d_camera;  // [position, rotation] of the camera
-  Eigen::Matrix<double, 2, 6> d_anchor;  // [position, rotation] of the anchor
+  Eigen::Matrix<double, 2, 6> d_clone;   // [position, rotation] of the clone
   Eigen::Matrix<double, 2, 3> d_point;   // [bearing tangent (2), inverse range]
 };
 
-/// Projects an anchored point; nothing if it is behind the camera or outside the lens.
-std::optional<PixelPrediction> PredictAnchored(const CameraModel& camera,
-                                               const Rigid3& world_from_camera,
-                                               const AnchoredPoint& point);
-/// Projects a fixed point [m, world]; d_anchor and d_point are not set.
+/// Projects a point of a clone; nothing if it is behind the camera or outside the lens.
+std::optional<PixelPrediction> PredictFromClone(const CameraModel& camera,
+                                                const Rigid3& world_from_camera,
+                                                const PointFromClone& point);
+/// Projects a fixed point [m, world]; d_clone and d_point are not set.
 std::optional<PixelPrediction> PredictFixed(const CameraModel& camera,
                                             const Rigid3& world_from_camera,
                                             const Eigen::Vector3d& point_in_world);
 /// Pixel only, of either.
-std::optional<Eigen::Vector2d> PixelOfAnchored(const CameraModel& camera,
-                                               const Rigid3& world_from_camera,
-                                               const AnchoredPoint& point);
+std::optional<Eigen::Vector2d> PixelFromClone(const CameraModel& camera,
+                                              const Rigid3& world_from_camera,
+                                              const PointFromClone& point);
 
 }  // namespace saccade

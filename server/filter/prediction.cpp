@@ -19,27 +19,27 @@ using SmallRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, kM
 
 }  // namespace
 
-AnchoredPoint FilterState::Point(const Feature& feature, bool first) const {
-  const Anchor& anchor = AnchorOf(feature);
+PointFromClone FilterState::Point(const Feature& feature, bool first) const {
+  const Clone& clone = CloneOf(feature);
   const PointInClone& in_clone = first ? feature.first : feature.point;
-  return {first ? anchor.first : anchor.pose, in_clone.bearing, in_clone.basis,
+  return {first ? clone.first : clone.pose, in_clone.bearing, in_clone.basis,
           feature.point.inverse_range};
 }
 
-AnchoredPoint FilterState::Point(FeatureId id) const { return Point(*Find(id), false); }
+PointFromClone FilterState::Point(FeatureId id) const { return Point(*Find(id), false); }
 
-FilterState::SmallMatrix FilterState::Gather(const Robot& robot, const Anchor& anchor,
+FilterState::SmallMatrix FilterState::Gather(const Robot& robot, const Clone& clone,
                                              const Feature& feature) const {
   const int size = kPoses + form_->dim();
-  const int camera = At(robot.block), from = At(anchor.block), point = At(feature.block);
+  const int camera = At(robot.block), from = At(clone.block), point = At(feature.block);
   std::array<int, kMostColumns> rows{};
   for (int k = 0; k < kPose; ++k) {
     rows[k] = camera + k;
     rows[kPose + k] = from + k;
   }
   for (int k = kPoses; k < size; ++k) rows[k] = point + k - kPoses;
-  const bool shared = IslandOf(robot.block) == IslandOf(anchor.block);
-  const Covariance& p = IslandAt(IslandOf(anchor.block)).p;
+  const bool shared = IslandOf(robot.block) == IslandOf(clone.block);
+  const Covariance& p = IslandAt(IslandOf(clone.block)).p;
   SmallMatrix block(size, size);
   for (int c = shared ? 0 : kPose; c < size; ++c) {
     for (int r = c; r < size; ++r) block(r, c) = block(c, r) = p.at(rows[r], rows[c]);
@@ -54,9 +54,9 @@ FilterState::SmallMatrix FilterState::Gather(const Robot& robot, const Anchor& a
 std::optional<PixelPrediction> FilterState::Linearise(const CameraModel& camera, const Robot& robot,
                                                       const Feature& feature) const {
   const Rigid3& pose = robot.motion.world_from_camera;
-  auto current = PredictAnchored(camera, pose, Point(feature, false));
+  auto current = PredictFromClone(camera, pose, Point(feature, false));
   if (!current || !Fej(IslandOf(robot.block))) return current;
-  const auto first = PredictAnchored(camera, pose, Point(feature, true));
+  const auto first = PredictFromClone(camera, pose, Point(feature, true));
   if (!first) return current;
   PixelPrediction mixed = *first;
   mixed.pixel = current->pixel;
@@ -70,9 +70,9 @@ std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera, 
   if (feature == nullptr) return std::nullopt;
   const auto at = Linearise(camera, Of(robot), *feature);
   if (!at) return std::nullopt;
-  const SmallMatrix p = Gather(Of(robot), AnchorOf(*feature), *feature);
+  const SmallMatrix p = Gather(Of(robot), CloneOf(*feature), *feature);
   SmallRows h(2, p.cols());
-  h << at->d_camera, at->d_anchor, form_->InState(at->d_point);
+  h << at->d_camera, at->d_clone, form_->InState(at->d_point);
   const SmallRows hp = h * p;
   PredictedPixel result{*at, hp * h.transpose(), hp.leftCols<6>()};
   const Eigen::Matrix2d d_bearing = at->d_point.leftCols<2>();
@@ -93,22 +93,22 @@ FeatureMarginal FilterState::Marginal(FeatureId id, RobotId robot) const {
   FeatureMarginal marginal;
   const Feature* feature = Find(id);
   if (feature == nullptr) return marginal;
-  const Anchor& anchor = AnchorOf(*feature);
+  const Clone& clone = CloneOf(*feature);
   const PointInClone& point = feature->point;
-  const SmallMatrix p = Gather(Of(robot), anchor, *feature);
+  const SmallMatrix p = Gather(Of(robot), clone, *feature);
   const int range = kPoses + form_->range();
   const double rho = std::max(point.inverse_range, options_.min_inverse_range);
-  const Matrix3d world_from_anchor = anchor.pose.RotationMatrix();
-  const Vector3d in_anchor = point.bearing / rho;
+  const Matrix3d world_from_clone = clone.pose.RotationMatrix();
+  const Vector3d in_clone = point.bearing / rho;
   marginal.inverse_range = point.inverse_range;
   marginal.inverse_range_sigma = std::sqrt(std::max(0.0, p(range, range)));
-  marginal.point_in_world = anchor.pose * in_anchor;
+  marginal.point_in_world = clone.pose * in_clone;
   Eigen::Matrix<double, 3, 3> d_point;  // by [bearing tangent, inverse range]
-  d_point.leftCols<2>() = world_from_anchor * point.basis / rho;
-  d_point.col(2) = world_from_anchor * in_anchor / -rho;
+  d_point.leftCols<2>() = world_from_clone * point.basis / rho;
+  d_point.col(2) = world_from_clone * in_clone / -rho;
   SmallRows in_world(3, p.cols());
   in_world << Eigen::Matrix<double, 3, 6>::Zero(), Matrix3d::Identity(),
-      -world_from_anchor * Skew(in_anchor), form_->InState(d_point);
+      -world_from_clone * Skew(in_clone), form_->InState(d_point);
   const Rigid3 camera_from_world = camera(robot).world_from_camera.Inverse();
   const Matrix3d turn = camera_from_world.RotationMatrix();
   SmallRows in_camera = turn * in_world;

@@ -174,11 +174,11 @@ class Problem {
 
 std::optional<ConditionalPixel> PixelGivenPose(const CameraModel& camera, const PosePrior& prior,
                                                const Eigen::LLT<Matrix6d>& prior_factor,
-                                               const std::variant<AnchoredPoint, Vector3d>& point,
+                                               const std::variant<PointFromClone, Vector3d>& point,
                                                const PredictedPixel& predicted,
                                                const Rigid3& pose) {
-  const auto at = std::holds_alternative<AnchoredPoint>(point)
-                      ? PredictAnchored(camera, pose, std::get<AnchoredPoint>(point))
+  const auto at = std::holds_alternative<PointFromClone>(point)
+                      ? PredictFromClone(camera, pose, std::get<PointFromClone>(point))
                       : PredictFixed(camera, pose, std::get<Vector3d>(point));
   if (!at) return std::nullopt;
   // E[pixel error | pose error] = Cov(pixel, pose) P^-1 pose error: the part beyond the pose's own

@@ -12,8 +12,8 @@ namespace saccade {
 
 /// A match as evidence for the camera's pose: what was predicted, and where it was found.
 struct PoseEvidence {
-  std::variant<AnchoredPoint, Eigen::Vector3d> point;  // [m, world] if known
-  PredictedPixel predicted;                            // at the predicted pose
+  std::variant<PointFromClone, Eigen::Vector3d> point;  // [m, world] if known
+  PredictedPixel predicted;                             // at the predicted pose
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();  // R [px^2]
 };
@@ -52,7 +52,7 @@ struct ConditionalPixel {
 };
 std::optional<ConditionalPixel> PixelGivenPose(
     const CameraModel& camera, const PosePrior& prior, const Eigen::LLT<Matrix6d>& prior_factor,
-    const std::variant<AnchoredPoint, Eigen::Vector3d>& point, const PredictedPixel& predicted,
+    const std::variant<PointFromClone, Eigen::Vector3d>& point, const PredictedPixel& predicted,
     const Rigid3& pose);
 
 /// Pose from matches with outliers and the motion prior (slam-spec 5.5, findings): the best 1-point

@@ -10,8 +10,8 @@ constexpr int kMature = 1000;  // updates: depths are known, Jacobians need no f
 
 }  // namespace
 
-std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMotion& camera,
-                                            const Matrix12d& covariance) {
+std::vector<CloneId> FilterState::Seed(const MapSeed& seed, const CameraMotion& camera,
+                                       const Matrix12d& covariance) {
   Reset(camera, covariance);
   Robot& robot = Of(kFirstRobot);
   const int number = IslandOf(robot.block);
@@ -23,19 +23,19 @@ std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMot
     robot.readout_s = seed.readout_s;
     rows.push_back(0);
   }
-  std::vector<AnchorPoseId> ids;
-  for (std::size_t k = 0; k < seed.anchors.size(); ++k) {
+  std::vector<CloneId> ids;
+  for (std::size_t k = 0; k < seed.clones.size(); ++k) {
     const BlockId block = Append(BlockKind::kClone, kPoseDim, number);
     for (int r = 0; r < kPoseDim; ++r) rows.push_back(1 + kPoseDim * static_cast<int>(k) + r);
-    anchors_.push_back({next_anchor_, block, 0, kMature, seed.anchors[k], seed.anchors[k]});
-    ids.push_back(next_anchor_++);
+    clones_.push_back({next_clone_, block, 0, kMature, seed.clones[k], seed.clones[k]});
+    ids.push_back(next_clone_++);
   }
-  const int points = 1 + kPoseDim * static_cast<int>(seed.anchors.size());
+  const int points = 1 + kPoseDim * static_cast<int>(seed.clones.size());
   for (std::size_t k = 0; k < seed.features.size(); ++k) {
     const MapSeed::Feature& from = seed.features[k];
     Feature feature;
     feature.id = from.id;
-    feature.anchor = ids[static_cast<std::size_t>(from.anchor)];
+    feature.clone = ids[static_cast<std::size_t>(from.clone)];
     feature.point = feature.first = {from.bearing, TangentBasis(from.bearing), from.inverse_range};
     feature.birth_covariance = from.birth_covariance;
     feature.block = Append(BlockKind::kFeature, form_->dim(), number);
@@ -43,7 +43,7 @@ std::vector<AnchorPoseId> FilterState::Seed(const MapSeed& seed, const CameraMot
       rows.push_back(points + 3 * static_cast<int>(k) + r);
     }
     features_.push_back(feature);
-    ++anchors_[static_cast<std::size_t>(from.anchor)].users;
+    ++clones_[static_cast<std::size_t>(from.clone)].users;
   }
   for (std::size_t c = 0; c < rows.size(); ++c) {
     for (std::size_t r = c; r < rows.size(); ++r) {

@@ -31,7 +31,7 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, Island& 
   const int n = p.dim();
   const int m = static_cast<int>(all.innovation.size());
   MatrixXd pht(n, m);  // P H^T
-  MatrixXd camera_columns(n, kPoseDim), anchor_columns(n, kPoseDim), point_columns(n, 3);
+  MatrixXd camera_columns(n, kPoseDim), clone_columns(n, kPoseDim), point_columns(n, 3);
   p.CopyColumns(all.camera, kPoseDim, camera_columns);
   MatrixXd readout_column(n, 1);
   if (all.readout >= 0) p.CopyColumns(all.readout, 1, readout_column);
@@ -41,10 +41,10 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, Island& 
     auto columns = pht.middleCols<2>(2 * static_cast<Eigen::Index>(k));
     columns.noalias() = camera_columns * rows.d_camera.transpose();
     if (all.readout >= 0) columns.noalias() += readout_column * rows.d_readout.transpose();
-    if (rows.anchor < 0) continue;
-    if (rows.anchor != copied) p.CopyColumns(rows.anchor, kPoseDim, anchor_columns);
-    copied = rows.anchor;
-    columns.noalias() += anchor_columns * rows.d_anchor.transpose();
+    if (rows.clone < 0) continue;
+    if (rows.clone != copied) p.CopyColumns(rows.clone, kPoseDim, clone_columns);
+    copied = rows.clone;
+    columns.noalias() += clone_columns * rows.d_clone.transpose();
     const int size = static_cast<int>(rows.d_point.cols());
     p.CopyColumns(rows.point, size, point_columns.leftCols(size));
     columns.noalias() += point_columns.leftCols(size) * rows.d_point.transpose();
@@ -56,8 +56,8 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, Island& 
     auto block = s.middleRows<2>(at);
     block.noalias() = rows.d_camera * pht.middleRows<kPoseDim>(all.camera);
     if (all.readout >= 0) block.noalias() += rows.d_readout * pht.row(all.readout);
-    if (rows.anchor >= 0) {
-      block.noalias() += rows.d_anchor * pht.middleRows<kPoseDim>(rows.anchor);
+    if (rows.clone >= 0) {
+      block.noalias() += rows.d_clone * pht.middleRows<kPoseDim>(rows.clone);
       block.noalias() += rows.d_point * pht.middleRows(rows.point, rows.d_point.cols());
     }
     s.block<2, 2>(at, at) += rows.noise;
@@ -73,7 +73,7 @@ absl::StatusOr<VectorXd> FilterState::KalmanStep(const Linearised& all, Island& 
   VectorXd error = pht * whitened;
   if (!error.allFinite()) return absl::FailedPreconditionError("filter: update is not finite");
   p.Downdate(pht);
-  if (island.mark) {
+  if (island.checkpoint) {
     record.gain = std::move(pht);
     record.factor = factor.matrixL();
   }
@@ -95,8 +95,8 @@ absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, Isl
     const auto at = 2 * static_cast<Eigen::Index>(k);
     h.block<2, kPoseDim>(at, all.camera) = rows.d_camera;
     if (all.readout >= 0) h.block<2, 1>(at, all.readout) = rows.d_readout;
-    if (rows.anchor >= 0) {
-      h.block<2, kPoseDim>(at, rows.anchor) = rows.d_anchor;
+    if (rows.clone >= 0) {
+      h.block<2, kPoseDim>(at, rows.clone) = rows.d_clone;
       h.block(at, rows.point, 2, rows.d_point.cols()) = rows.d_point;
     }
     const Eigen::Matrix2d weight = rows.noise.inverse();
@@ -115,7 +115,7 @@ absl::StatusOr<VectorXd> FilterState::InformationStep(const Linearised& all, Isl
   report.rows = m;
   report.nis = all.innovation.dot(weighted_innovation) - pulled.dot(error);
   p.Assign(0.5 * (posterior + posterior.transpose()));
-  if (island.mark) record.gain.noalias() = posterior * weighted.transpose();
+  if (island.checkpoint) record.gain.noalias() = posterior * weighted.transpose();
   return error;
 }
 
@@ -186,11 +186,11 @@ absl::StatusOr<UpdateReport> FilterState::Update(const CameraModel& camera,
   for (std::size_t k = 0; k < ranges.size(); ++k) {
     const double taken = 1.0 - kept[static_cast<Eigen::Index>(k)];
     (*error)[ranges[k]] *= taken;
-    if (island.mark) record.gain.row(ranges[k]) *= taken;
+    if (island.checkpoint) record.gain.row(ranges[k]) *= taken;
   }
-  if (island.mark) {
+  if (island.checkpoint) {
     record.rows.assign(all->rows.begin(), all->rows.end());
-    island.mark->journal.Add(std::move(record));
+    island.checkpoint->journal.Add(std::move(record));
   }
   island.p.Blend(ranges, before, kept * kept.transpose());
   robot.first_pose = linearisation;

@@ -14,7 +14,7 @@ constexpr double kLeastDepthSigma = 0.005;  // a woken one's; of its inverse ran
 
 std::optional<GraphEstimate> EstimateOf(const FilterState& filter, FeatureId id) {
   if (!filter.Has(id)) return std::nullopt;
-  const AnchoredPoint point = filter.Point(id);
+  const PointFromClone point = filter.Point(id);
   return GraphEstimate{point.bearing, point.inverse_range};
 }
 
@@ -76,13 +76,13 @@ bool Map::HasNews(const FilterState& filter, double distance_m) const {
 void Map::AddKeyframe(const FilterState& filter, double distance_m, double bearing_sigma_rad,
                       std::span<const GraphSighting> sightings) {
   std::vector<GraphBirth> births;
-  std::optional<AnchorPoseId> clone;
+  std::optional<CloneId> clone;
   const std::vector<FeatureId> ids = filter.FeatureIds();
   for (auto id = ids.rbegin(); id != ids.rend() && *id > newest_feature_; ++id) {
-    const AnchoredPoint point = filter.Point(*id);
+    const PointFromClone point = filter.Point(*id);
     births.push_back({*id, point.bearing, bearing_sigma_rad, point.inverse_range,
                       filter.Marginal(*id).inverse_range_sigma});
-    clone = filter.AnchorOf(*id);
+    clone = filter.CloneOf(*id);
   }
   using Life = KeyframeGraph::Life;
   const KeyframeId id = keyframes_.Add(filter.camera().world_from_camera, distance_m, sightings,
@@ -96,7 +96,7 @@ void Map::AddKeyframe(const FilterState& filter, double distance_m, double beari
 
 void Map::TakeKeyframe(const Rigid3& world_from_camera, double distance_m,
                        std::span<const GraphSighting> sightings, std::span<const GraphBirth> births,
-                       std::optional<AnchorPoseId> clone) {
+                       std::optional<CloneId> clone) {
   const KeyframeId id = keyframes_.Add(world_from_camera, distance_m, sightings, births);
   if (clone) clones_[id] = *clone;
   for (const GraphBirth& birth : births) newest_feature_ = std::max(newest_feature_, birth.id);
@@ -125,12 +125,12 @@ void Map::Retire(std::span<const FeatureId> ids, const Judge& judge, FilterState
 
 void Map::Wake(KeyframeId keyframe, std::span<const FeatureId> ids, const Matrix6d& covariance,
                std::int64_t frame, FilterState& filter) {
-  const AnchorPoseId clone = CloneOf(keyframe, covariance, filter);
+  const CloneId clone = CloneOf(keyframe, covariance, filter);
   for (const FeatureId id : ids) WakeOne(id, clone, frame, filter);
   filter.Remove({});  // a clone that nothing was woken in goes again
 }
 
-void Map::WakeOne(FeatureId id, AnchorPoseId clone, std::int64_t frame, FilterState& filter) {
+void Map::WakeOne(FeatureId id, CloneId clone, std::int64_t frame, FilterState& filter) {
   const Recalled recalled = *Recall(id);
   DormantLandmark dormant = at_rest_.Take(id);
   FeatureBirth birth;
@@ -150,10 +150,10 @@ void Map::WakeOne(FeatureId id, AnchorPoseId clone, std::int64_t frame, FilterSt
   in_use_.Add(std::move(landmark));
 }
 
-AnchorPoseId Map::CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter) {
+CloneId Map::CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter) {
   const auto known = clones_.find(id);
-  if (known != clones_.end() && filter.AnchorPose(known->second)) return known->second;
-  return clones_[id] = filter.AddAnchor(*keyframes_.Pose(id), covariance);
+  if (known != clones_.end() && filter.ClonePose(known->second)) return known->second;
+  return clones_[id] = filter.AddClone(*keyframes_.Pose(id), covariance);
 }
 
 void Map::LocateAtRest() {
@@ -172,7 +172,7 @@ void Map::Take(const KeyframeGraph::Job& job, FilterState& filter) {
   for (std::size_t k = 0; k < job.keyframes.size(); ++k) {
     const Rigid3& pose = job.problem.keyframes[k].world_from_camera;
     const auto clone = clones_.find(job.keyframes[k]);
-    if (clone != clones_.end()) refinement.anchors[clone->second] = pose;
+    if (clone != clones_.end()) refinement.clones[clone->second] = pose;
     if (job.keyframes[k] == job.newest) refinement.world_from_camera = pose;
   }
   for (std::size_t k = 0; k < job.points.size(); ++k) {
@@ -182,7 +182,7 @@ void Map::Take(const KeyframeGraph::Job& job, FilterState& filter) {
   filter.Refine(refinement);
   ForgetClones(filter);
   for (auto it = clones_.upper_bound(job.newest); it != clones_.end(); ++it) {
-    keyframes_.SetPose(it->first, *filter.AnchorPose(it->second));
+    keyframes_.SetPose(it->first, *filter.ClonePose(it->second));
   }
 }
 
@@ -220,7 +220,7 @@ void Map::Restore(const Checkpoint& checkpoint, FilterState& filter) {
 }
 
 void Map::ForgetClones(const FilterState& filter) {
-  std::erase_if(clones_, [&](const auto& entry) { return !filter.AnchorPose(entry.second); });
+  std::erase_if(clones_, [&](const auto& entry) { return !filter.ClonePose(entry.second); });
 }
 
 }  // namespace saccade

@@ -23,7 +23,7 @@ enum class LandmarkState {
 
 /// Why a landmark leaves the filter for later.
 struct RestNote {
-  AnchorPoseId home = 0;         // clone that its covariance is counted from
+  CloneId home = 0;              // clone that its covariance is counted from
   std::int64_t rests_until = 0;  // frame
   int failures = 0;              // times that it was woken and not seen
   bool learnt = true;            // the keyframes take the filter's last word on where it is
@@ -68,7 +68,7 @@ class Map {
   /// A keyframe of a start that was solved elsewhere, and the clone that stands for it.
   void TakeKeyframe(const Rigid3& world_from_camera, double distance_m,
                     std::span<const GraphSighting> sightings, std::span<const GraphBirth> births,
-                    std::optional<AnchorPoseId> clone);
+                    std::optional<CloneId> clone);
 
   /// Takes landmarks out of the filter: those that get a note come to rest, the others are gone.
   using Judge = std::function<std::optional<RestNote>(const Landmark&)>;
@@ -83,7 +83,7 @@ class Map {
 
   /// An adjustment around the newest keyframe; nothing while there is too little parallax.
   std::optional<KeyframeGraph::Job> MakeJob(const FilterState& filter) const;
-  /// Takes an adjusted one over, into the filter as it was at its mark.
+  /// Takes an adjusted one over, into the filter as it was at its checkpoint.
   void Take(const KeyframeGraph::Job& job, FilterState& filter);
   /// Moves all of it, and the filter with the newest keyframe (a closed loop). Landmarks that were
   /// woken where the two parts disagree by more than `torn_m` go back to rest.
@@ -100,8 +100,8 @@ class Map {
   void Restore(const Checkpoint& checkpoint, FilterState& filter);
 
  private:
-  AnchorPoseId CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter);
-  void WakeOne(FeatureId id, AnchorPoseId clone, std::int64_t frame, FilterState& filter);
+  CloneId CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter);
+  void WakeOne(FeatureId id, CloneId clone, std::int64_t frame, FilterState& filter);
   void RestTorn(const MapCorrection& correction, double torn_m, FilterState& filter);
   /// Clones that have left the filter stand for nothing any more.
   void ForgetClones(const FilterState& filter);
@@ -109,7 +109,7 @@ class Map {
   LandmarkMap in_use_;
   DormantLandmarks at_rest_;
   KeyframeGraph keyframes_;
-  std::map<KeyframeId, AnchorPoseId> clones_;
+  std::map<KeyframeId, CloneId> clones_;
   FeatureId newest_feature_ = 0;  // that the keyframes know
 };
 

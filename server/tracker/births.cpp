@@ -80,7 +80,7 @@ std::optional<Eigen::Vector2d> Births::CornerNear(const ImagePyramid& pyramid,
 }
 
 std::optional<FeatureId> Births::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
-                                       const DepthGuess& depth, AnchorPoseId anchor,
+                                       const DepthGuess& depth, CloneId clone,
                                        const CameraMotion& motion, const FrameMatcher& matcher,
                                        FilterState& filter, LandmarkMap& map) {
   auto patch = CutPatch(frame.grey, pixel, frame.camera);
@@ -102,7 +102,7 @@ std::optional<FeatureId> Births::Plant(const Frame& frame, const Eigen::Vector2d
   birth.bearing_covariance = sigma * sigma * d_bearing * d_bearing.transpose();
   birth.inverse_range = depth.inverse_range;
   birth.inverse_range_sigma = depth.inverse_range_sigma;
-  if (!filter.AddFeature(anchor, birth).ok()) return std::nullopt;
+  if (!filter.AddFeature(clone, birth).ok()) return std::nullopt;
   Landmark landmark;
   landmark.id = birth.id;
   landmark.patch = *std::move(patch);

@@ -41,9 +41,9 @@ class Births {
   /// Starts one feature at a pixel, seen by a camera of these velocities; nothing if there is no
   /// texture or no room for a patch.
   std::optional<FeatureId> Plant(const Frame& frame, const Eigen::Vector2d& pixel,
-                                 const DepthGuess& depth, AnchorPoseId anchor,
-                                 const CameraMotion& motion, const FrameMatcher& matcher,
-                                 FilterState& filter, LandmarkMap& map);
+                                 const DepthGuess& depth, CloneId clone, const CameraMotion& motion,
+                                 const FrameMatcher& matcher, FilterState& filter,
+                                 LandmarkMap& map);
   /// True if Grow() would start features now.
   bool Wants(const FrameMatches& matches) const;
 

@@ -30,11 +30,11 @@ SearchOptions MakeSearchOptions(const TrackerOptions& options) {
 }
 
 /// Pose, direction and inverse range from where the landmark's patch was seen.
-AnchoredPoint FromBirth(const Landmark& landmark,
-                        const std::variant<AnchoredPoint, Eigen::Vector3d>& point) {
-  if (std::holds_alternative<AnchoredPoint>(point)) return std::get<AnchoredPoint>(point);
-  AnchoredPoint from;
-  from.world_from_anchor = landmark.known->world_from_birth;
+PointFromClone FromBirth(const Landmark& landmark,
+                         const std::variant<PointFromClone, Eigen::Vector3d>& point) {
+  if (std::holds_alternative<PointFromClone>(point)) return std::get<PointFromClone>(point);
+  PointFromClone from;
+  from.world_from_clone = landmark.known->world_from_birth;
   const Eigen::Vector3d seen =
       landmark.known->world_from_birth.Inverse() * std::get<Eigen::Vector3d>(point);
   from.bearing = seen.normalized();
@@ -69,7 +69,7 @@ void HeedGroups(const CameraModel& camera, const FilterState& filter, const Land
   constexpr std::uint32_t kMature = 15;  // matches
   constexpr double kDepthKnown = 0.05;   // sigma / inverse range
   constexpr std::size_t kFewest = 12;
-  std::map<AnchorPoseId, int> group_of;
+  std::map<CloneId, int> group_of;
   std::vector<GroupResidual> residuals;
   std::vector<LandmarkMatch*> judged;
   for (LandmarkMatch& match : matches.in_view) {
@@ -78,12 +78,13 @@ void HeedGroups(const CameraModel& camera, const FilterState& filter, const Land
     }
     const FeatureMarginal marginal = filter.Marginal(match.id);
     if (marginal.inverse_range_sigma > kDepthKnown * marginal.inverse_range) continue;
-    const auto at = PredictAnchored(camera, matches.pose.world_from_camera, filter.Point(match.id));
+    const auto at =
+        PredictFromClone(camera, matches.pose.world_from_camera, filter.Point(match.id));
     if (!at) continue;
     const int next = static_cast<int>(group_of.size());
-    const int group = group_of.emplace(filter.AnchorOf(match.id), next).first->second;
+    const int group = group_of.emplace(filter.CloneOf(match.id), next).first->second;
     residuals.push_back({group, match.pixel - match.row_shift - at->pixel, at->d_camera,
-                         at->d_anchor.rightCols<3>()});
+                         at->d_clone.rightCols<3>()});
     judged.push_back(&match);
   }
   if (judged.size() < kFewest) return;
@@ -218,12 +219,12 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   BookRow(camera, motion, readout_s, expected->pixel, match);
   match.pixel = expected->pixel + match.row_shift;
   const Eigen::Vector2d centre = match.pixel;
-  const AnchoredPoint birth = FromBirth(landmark, match.point);
-  const WarpStatus warped =
-      options_.warp ? WarpPatch(landmark.patch, pose.Inverse() * birth.world_from_anchor,
-                                birth.bearing, std::max(0.0, birth.inverse_range),
-                                Eigen::Vector3d::Zero(), camera, centre, warp_, warped_)
-                    : CopyPatch(landmark.patch, warp_, warped_);
+  const PointFromClone birth = FromBirth(landmark, match.point);
+  const WarpStatus warped = options_.warp
+                                ? WarpPatch(landmark.patch, pose.Inverse() * birth.world_from_clone,
+                                            birth.bearing, std::max(0.0, birth.inverse_range),
+                                            Eigen::Vector3d::Zero(), camera, centre, warp_, warped_)
+                                : CopyPatch(landmark.patch, warp_, warped_);
   if (warped != WarpStatus::kOk) return;  // not seen from here: no attempt
   const double sigma = PixelSigma(camera, expected->pixel);
   const Eigen::Matrix2d spread = expected->d_pose * pose_covariance * expected->d_pose.transpose() +

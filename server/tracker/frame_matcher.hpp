@@ -15,8 +15,8 @@ namespace saccade {
 /// What became of one landmark in one frame.
 struct LandmarkMatch {
   FeatureId id = 0;
-  PredictedPixel predicted;                            // at the predicted pose
-  std::variant<AnchoredPoint, Eigen::Vector3d> point;  // as the filter has it; known points
+  PredictedPixel predicted;                             // at the predicted pose
+  std::variant<PointFromClone, Eigen::Vector3d> point;  // as the filter has it; known points
   bool searched = false;
   bool found = false;
   bool hidden = false;  // nothing but blank where it should be: no attempt

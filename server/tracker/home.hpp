@@ -17,7 +17,7 @@ struct HomeOptions {
 /// once hardly any of it was seen from `home` or before, or once its direction is only loosely tied
 /// to home (back at old places, or at woken ones). Nothing: home stays; also while a point of the
 /// target is in view, which is the world.
-std::optional<AnchorPoseId> WantedHome(const FrameMatches& matches, const FilterState& filter,
-                                       AnchorPoseId home, const HomeOptions& options);
+std::optional<CloneId> WantedHome(const FrameMatches& matches, const FilterState& filter,
+                                  CloneId home, const HomeOptions& options);
 
 }  // namespace saccade

@@ -140,9 +140,9 @@ absl::StatusOr<FeatureId> Tracker::SeedFeature(const Frame& clicked_frame,
   const CameraModel& camera = *last_frame_.camera;
   const Rigid3& pose = filter_.camera().world_from_camera;
   const double range = depth_prior_m / std::max(0.1, patch->birth_bearing.z());
-  AnchoredPoint clicked{world_from_camera, patch->birth_bearing, TangentBasis(patch->birth_bearing),
-                        1.0 / range};
-  const auto expected = PredictAnchored(camera, pose, clicked);
+  PointFromClone clicked{world_from_camera, patch->birth_bearing,
+                         TangentBasis(patch->birth_bearing), 1.0 / range};
+  const auto expected = PredictFromClone(camera, pose, clicked);
   if (!expected || !camera.InImage(expected->pixel, 12.0)) {
     return absl::NotFoundError("feature: what was clicked is not in view any more");
   }

@@ -28,7 +28,7 @@ void Refiner::Stop() {
 
 void Refiner::Drop(FilterState& filter) {
   Stop();
-  filter.DropMark();
+  filter.DropCheckpoint();
 }
 
 void Refiner::Start(std::int64_t frame, Timestamp time_ns, const Map& map, FilterState& filter) {
@@ -37,7 +37,7 @@ void Refiner::Start(std::int64_t frame, Timestamp time_ns, const Map& map, Filte
   if (!job) return;
   started_ = frame;
   started_ns_ = time_ns;
-  filter.Mark();
+  filter.SetCheckpoint();
   running_ = std::async(std::launch::async, [this, job = *std::move(job)]() mutable {
     // Late is no loss, but pictures and heartbeats are: what is live comes first.
     if (options_.adjust_live) setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
@@ -65,7 +65,7 @@ bool Refiner::Finish(std::int64_t frame, Timestamp time_ns, double inverse_range
   const auto job = running_.get();
   waited_ms_ = watch.Lap_ms();
   if (!job) {
-    filter.DropMark();
+    filter.DropCheckpoint();
     return false;
   }
   const Rigid3 before = filter.camera().world_from_camera;

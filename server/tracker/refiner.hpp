@@ -27,7 +27,8 @@ class Refiner {
 
   /// A running adjustment is stopped and dropped: the map was thrown away.
   void Reset() { Stop(); }
-  /// The same, and the filter need not keep its mark for it: the camera was lost, or the map moved.
+  /// The same, and the filter need not keep its checkpoint for it: the camera was lost, or the map
+  /// moved.
   void Drop(FilterState& filter);
   /// Starts an adjustment around the newest keyframe, if none is running.
   void Start(std::int64_t frame, Timestamp time_ns, const Map& map, FilterState& filter);

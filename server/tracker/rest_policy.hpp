@@ -8,7 +8,7 @@ namespace saccade {
 /// Where the tracker is when it looks after its landmarks.
 struct MapMoment {
   std::int64_t frame = 0;
-  AnchorPoseId home = 0;       // clone that errors are counted from
+  CloneId home = 0;            // clone that errors are counted from
   double inverse_range = 1.0;  // [1/m] typical, of what is in view
 };
 

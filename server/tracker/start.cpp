@@ -40,7 +40,7 @@ void Tracker::TakeOver(const FoundStart& start, const Frame& frame) {
       Eigen::Vector3d::Constant(kAngleSigma_rad),
       Eigen::Vector3d::Constant(kVelocityShare_1_s * unit),
       Eigen::Vector3d::Constant(kAngularVelocitySigma_rad_s);
-  const std::vector<AnchorPoseId> clones =
+  const std::vector<CloneId> clones =
       filter_.Seed(start.seed, motion, sigma.cwiseAbs2().asDiagonal());
   home_ = clones.front();
   map_.BeginAnew(filter_);
@@ -49,7 +49,7 @@ void Tracker::TakeOver(const FoundStart& start, const Frame& frame) {
   refiner_.Reset();
   for (const FoundStart::Keyframe& keyframe : start.keyframes) {
     if (!options_.adjust) break;
-    std::optional<AnchorPoseId> clone;
+    std::optional<CloneId> clone;
     if (keyframe.anchor >= 0) clone = clones[static_cast<std::size_t>(keyframe.anchor)];
     map_.TakeKeyframe(keyframe.world_from_camera, unit, keyframe.sightings, keyframe.births, clone);
   }

@@ -168,7 +168,7 @@ StartFinder::Job StartFinder::MakeJob(const FilterState& filter) const {
       StartPoint point;
       point.anchor = static_cast<int>(at);
       point.seen = birth.ray;
-      const AnchoredPoint now = filter.Point(birth.id);
+      const PointFromClone now = filter.Point(birth.id);
       point.bearing = point.seen.At(job.problem.readout_s);
       point.inverse_range = std::max(1e-3, now.inverse_range);
       job.problem.points.push_back(point);

@@ -20,7 +20,7 @@ struct FoundStart {
     Rigid3 world_from_camera;
     std::vector<GraphSighting> sightings;
     std::vector<GraphBirth> births;
-    int anchor = -1;  // index into seed.anchors; -1: nothing in the filter hangs on it
+    int anchor = -1;  // index into seed.clones; -1: nothing in the filter hangs on it
   };
   MapSeed seed;
   std::vector<Keyframe> keyframes;  // in order of time

@@ -53,8 +53,8 @@ FoundStart::Keyframe StartFinder::ReadKeyframe(std::size_t k, const StartSolutio
     const StartPoint& point = found.points[p];
     if (point.anchor != static_cast<int>(k) || !Usable(point, start)) continue;
     if (keyframe.anchor < 0) {
-      keyframe.anchor = static_cast<int>(start.seed.anchors.size());
-      start.seed.anchors.push_back(keyframe.world_from_camera);
+      keyframe.anchor = static_cast<int>(start.seed.clones.size());
+      start.seed.clones.push_back(keyframe.world_from_camera);
     }
     const Eigen::Index range = first_point + 3 * static_cast<Eigen::Index>(p) + 2;
     const double sigma = std::sqrt(std::max(0.0, solution.covariance(range, range)));

@@ -141,7 +141,7 @@ class Tracker final : public FrameTracker {
   std::int64_t frames_lost_ = 0;
   std::int64_t frames_tracked_ = 0;  // of this map
   std::uint64_t revision_ = 0;
-  AnchorPoseId home_ = 1;  // clone that errors are counted from; at first where the map began
+  CloneId home_ = 1;  // clone that errors are counted from; at first where the map began
   std::uint64_t generation_ = 0;
   FrameMatches matches_;
   StageTimes times_;

@@ -116,7 +116,7 @@ std::vector<Observation> FilterRun::See() {
 
 absl::Status FilterRun::Birth() {
   if (complete() || frame_ % kBirthEvery != 1) return absl::OkStatus();
-  const AnchorPoseId anchor = filter_.AddAnchor(robot_);
+  const CloneId clone = filter_.AddClone(robot_);
   const std::size_t births = born_ == 0 ? kFirstBirths : kBirthsPerClone;
   for (std::size_t k = 0; k < births && !complete(); ++k) {
     FeatureBirth birth;
@@ -128,7 +128,7 @@ absl::Status FilterRun::Birth() {
     const double inverse_range = 1.0 / (truth_.Inverse() * points_[born_]).norm();
     birth.inverse_range_sigma = kRelativeDepthSigma * inverse_range;
     birth.inverse_range = inverse_range + birth.inverse_range_sigma * normal_(random_);
-    if (const absl::Status status = filter_.AddFeature(anchor, birth); !status.ok()) return status;
+    if (const absl::Status status = filter_.AddFeature(clone, birth); !status.ok()) return status;
     ++born_;
   }
   return absl::OkStatus();

@@ -34,7 +34,7 @@ class Simulation {
   }
 
   void BirthAll(double inverse_range, double sigma, double noise_px) {
-    const AnchorPoseId anchor = filter_.AddAnchor();
+    const CloneId clone = filter_.AddClone();
     for (std::size_t k = 0; k < points_.size(); ++k) {
       const auto pixel = lens_.Project(truth_.Inverse() * points_[k]);
       if (!pixel || !lens_.InImage(*pixel)) continue;
@@ -45,7 +45,7 @@ class Simulation {
       birth.bearing_covariance = noise_px * noise_px * d_bearing * d_bearing.transpose();
       birth.inverse_range = inverse_range;
       birth.inverse_range_sigma = sigma;
-      ASSERT_TRUE(filter_.AddFeature(anchor, birth).ok());
+      ASSERT_TRUE(filter_.AddFeature(clone, birth).ok());
     }
   }
 
@@ -113,10 +113,10 @@ TEST(FilterState, AugmentThenDeleteRestoresEverythingT3) {
   for (int k = 1; k < 20; ++k) sim.Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.5);
   const Eigen::MatrixXd before = sim.filter_.FullCovariance();
   const Eigen::Vector3d point = sim.filter_.Marginal(7).point_in_world;
-  const AnchorPoseId anchor = sim.filter_.AddAnchor();
+  const CloneId clone = sim.filter_.AddClone();
   FeatureBirth birth;
   birth.id = 1000;
-  ASSERT_TRUE(sim.filter_.AddFeature(anchor, birth).ok());
+  ASSERT_TRUE(sim.filter_.AddFeature(clone, birth).ok());
   EXPECT_EQ(sim.filter_.dim(), before.rows() + 9);
   sim.filter_.Remove(std::vector<FeatureId>{1000});
   ASSERT_EQ(sim.filter_.dim(), before.rows());
@@ -141,7 +141,7 @@ TEST(FilterState, CloneCarriesTheWholeCovarianceOfThePose) {
   sim.BirthAll(0.5, 0.25, 0.5);
   for (int k = 1; k < 10; ++k) sim.Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.5);
   const int offset = sim.filter_.dim();
-  sim.filter_.AddAnchor();
+  sim.filter_.AddClone();
   const Eigen::MatrixXd p = sim.filter_.FullCovariance();
   EXPECT_EQ(Eigen::MatrixXd(p.block(offset, 0, 6, offset)),
             Eigen::MatrixXd(p.block(0, 0, 6, offset)));
@@ -154,7 +154,7 @@ TEST(FilterState, CountingErrorsFromACloneKeepsWhatIsSeenFromElsewhere) {
   run.filter_.Reset(CameraMotion(), SmallCovariance(0.5, 0.2, 0.3, 0.5));
   run.BirthAll(0.5, 0.25, 0.3);
   for (int k = 1; k < 80; ++k) run.Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.3);
-  const AnchorPoseId clone = run.filter_.AnchorOf(1);
+  const CloneId clone = run.filter_.CloneOf(1);
   const StateLayout& layout = run.filter_.layout();
   const int of_clone = layout[layout.Blocks(0)[1]].offset;  // behind the camera
   ASSERT_GT(run.filter_.FullCovariance().block(of_clone, of_clone, 6, 6).trace(), 0.5);
@@ -224,23 +224,23 @@ TEST(FilterState, APoseFromElsewhereHasAnErrorOfItsOwn) {
   };
   const double error_before = error();
   // Ten of them leave and come back, on a clone that is 3 cm and 1 deg from where it was.
-  const AnchoredPoint first = run.filter_.Point(3);
+  const PointFromClone first = run.filter_.Point(3);
   std::vector<FeatureBirth> births;
   for (FeatureId id = 3; id < 13; ++id) {
     if (!run.filter_.Has(id)) continue;
-    const AnchoredPoint known = run.filter_.Point(id);
+    const PointFromClone known = run.filter_.Point(id);
     births.push_back({id, known.bearing, 1e-7 * Eigen::Matrix3d::Identity(), known.inverse_range,
                       run.filter_.Marginal(id).inverse_range_sigma});
   }
   ASSERT_GT(births.size(), 5u);
   for (const FeatureBirth& birth : births) run.filter_.Remove(std::vector<FeatureId>{birth.id});
-  const Rigid3 right = first.world_from_anchor;
+  const Rigid3 right = first.world_from_clone;
   const Rigid3 wrong = {right.rotation * ExpQuaternion({0.01, -0.01, 0.01}),
                         right.translation + Eigen::Vector3d(0.02, -0.02, 0.01)};
   Vector6 sigma;
   sigma << 0.02, 0.02, 0.02, 0.01, 0.01, 0.01;
   const int offset = run.filter_.dim();
-  const AnchorPoseId clone = run.filter_.AddAnchor(wrong, sigma.cwiseAbs2().asDiagonal());
+  const CloneId clone = run.filter_.AddClone(wrong, sigma.cwiseAbs2().asDiagonal());
   for (const FeatureBirth& birth : births) {
     ASSERT_TRUE(run.filter_.AddFeature(clone, birth).ok());
     EXPECT_FALSE(run.filter_.AddFeature(clone, birth).ok()) << "the id is taken";
@@ -250,7 +250,7 @@ TEST(FilterState, APoseFromElsewhereHasAnErrorOfItsOwn) {
   const std::vector<FeatureId> ids = run.filter_.FeatureIds();
   EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end()));
   for (int k = 90; k < 120; ++k) run.Step(1.0 / 30, Simulation::Sway(k / 30.0), 0.3);
-  const Rigid3 found = *run.filter_.AnchorPose(clone);
+  const Rigid3 found = *run.filter_.ClonePose(clone);
   EXPECT_LT((found.translation - right.translation).norm(), 0.01);
   EXPECT_LT(RotationAngle(found, right), 0.005);
   // What stayed was known far better, and hardly moves for it.
@@ -458,7 +458,7 @@ TEST(FilterState, PredictingOverADayCostsWhatASecondCosts) {
   RandomWorld world(3);
   FilterState filter{FilterOptions()};
   filter.Reset(CameraMotion(), SmallCovariance(0, 0, 0.3, 0.5));
-  const AnchorPoseId anchor = filter.AddAnchor();
+  const CloneId clone = filter.AddClone();
   for (FeatureId id = 1; id <= 100; ++id) {
     FeatureBirth birth;
     birth.id = id;
@@ -466,7 +466,7 @@ TEST(FilterState, PredictingOverADayCostsWhatASecondCosts) {
         Eigen::Vector3d(world.Uniform(-0.5, 0.5), world.Uniform(-0.4, 0.4), 1).normalized();
     birth.inverse_range = 0.5;
     birth.inverse_range_sigma = 0.25;
-    ASSERT_TRUE(filter.AddFeature(anchor, birth).ok());
+    ASSERT_TRUE(filter.AddFeature(clone, birth).ok());
   }
   const auto cpu_ms = [&](double dt) {
     const std::clock_t begin = std::clock();

@@ -213,7 +213,7 @@ TEST(HeadMotion, JournalCarriesCorrectionsThroughIt) {
   RandomWorld world(9);
   FilterState late{FilterOptions()}, early{FilterOptions()};
   late.Reset(start, StartCovariance());
-  late.Mark();
+  late.SetCheckpoint();
   Vector6 step;
   step = world.NormalVector<6>(1e-4);
   const Rigid3 moved = Moved(start.world_from_camera, step);

@@ -46,22 +46,22 @@ TEST(MotionJacobians, MatchCentralDifferencesT1) {
 
 struct Sight {
   Rigid3 camera;
-  AnchoredPoint point;
+  PointFromClone point;
 };
 
-/// An anchored point that both its anchor and the camera see.
+/// a point of a clone that both its clone and the camera see.
 Sight RandomSight(RandomWorld& world, const CameraModel& lens) {
   while (true) {
     Sight sight;
     sight.camera = world.Pose();
     Eigen::Matrix<double, 6, 1> apart;
     apart << world.NormalVector<3>(0.5), world.NormalVector<3>(0.2);
-    sight.point.world_from_anchor = Moved(sight.camera, apart);
+    sight.point.world_from_clone = Moved(sight.camera, apart);
     sight.point.bearing = *lens.Unproject({world.Uniform(40, 600), world.Uniform(40, 440)});
     sight.point.basis = TangentBasis(sight.point.bearing);
     MoveBearing(0.01 * world.NormalVector<2>(), sight.point.bearing, sight.point.basis);
     sight.point.inverse_range = world.Uniform(0.05, 1.5);
-    const auto at = PredictAnchored(lens, sight.camera, sight.point);
+    const auto at = PredictFromClone(lens, sight.camera, sight.point);
     if (at && at->ray.z() > 0.2 && lens.InImage(at->pixel)) return sight;
   }
 }
@@ -76,29 +76,29 @@ Eigen::Matrix<double, 2, kSize> Differences(const Function& pixel_after) {
   return jacobian;
 }
 
-TEST(PointJacobians, AnchoredMatchCentralDifferencesT1) {
+TEST(PointJacobians, FromCloneMatchCentralDifferencesT1) {
   RandomWorld world(2);
   const CameraModel lens = TestCamera();
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   for (int k = 0; k < kStates; ++k) {
     const Sight sight = RandomSight(world, lens);
-    const PixelPrediction at = *PredictAnchored(lens, sight.camera, sight.point);
+    const PixelPrediction at = *PredictFromClone(lens, sight.camera, sight.point);
     const auto by_camera = Differences<6>([&](const Vector6& step) -> Eigen::Vector2d {
-      return *PixelOfAnchored(lens, Moved(sight.camera, step), sight.point);
+      return *PixelFromClone(lens, Moved(sight.camera, step), sight.point);
     });
-    const auto by_anchor = Differences<6>([&](const Vector6& step) -> Eigen::Vector2d {
-      AnchoredPoint moved = sight.point;
-      moved.world_from_anchor = Moved(moved.world_from_anchor, step);
-      return *PixelOfAnchored(lens, sight.camera, moved);
+    const auto by_clone = Differences<6>([&](const Vector6& step) -> Eigen::Vector2d {
+      PointFromClone moved = sight.point;
+      moved.world_from_clone = Moved(moved.world_from_clone, step);
+      return *PixelFromClone(lens, sight.camera, moved);
     });
     const auto by_point = Differences<3>([&](const Eigen::Vector3d& step) -> Eigen::Vector2d {
-      AnchoredPoint moved = sight.point;
+      PointFromClone moved = sight.point;
       MoveBearing(step.head<2>(), moved.bearing, moved.basis);
       moved.inverse_range += step[2];
-      return *PixelOfAnchored(lens, sight.camera, moved);
+      return *PixelFromClone(lens, sight.camera, moved);
     });
     ASSERT_LT(RelativeError(at.d_camera, by_camera), kTolerance);
-    ASSERT_LT(RelativeError(at.d_anchor, by_anchor), kTolerance);
+    ASSERT_LT(RelativeError(at.d_clone, by_clone), kTolerance);
     ASSERT_LT(RelativeError(at.d_point, by_point), kTolerance);
   }
 }

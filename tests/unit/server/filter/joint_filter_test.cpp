@@ -114,7 +114,7 @@ class Wearer {
   }
 
   void Birth() {
-    const AnchorPoseId clone = filter_.AddAnchor(robot_);
+    const CloneId clone = filter_.AddClone(robot_);
     for (int k = 0; k < 6 && mine_.size() < 30; ++k) {
       const Eigen::Vector3d& point = points_[born_ % 60];
       const auto pixel = lens_.Project(truth_.Inverse() * point);
@@ -137,16 +137,16 @@ class Wearer {
 
   /// What comes now and then: an adjustment, another home, another world, a relocalisation.
   void Keep() {
-    if (frame_ % 50 == 20) filter_.Mark(robot_);
+    if (frame_ % 50 == 20) filter_.SetCheckpoint(robot_);
     if (frame_ % 50 == 30) {
       Refinement better;
       for (const FeatureId id : mine_) {
-        const AnchoredPoint point = filter_.Point(id);
+        const PointFromClone point = filter_.Point(id);
         better.features[id] = {point.bearing, 1.01 * point.inverse_range};
       }
       filter_.Refine(better, robot_);
     }
-    if (frame_ % 80 == 79) filter_.CountErrorsFrom(filter_.AnchorOf(mine_.front()));
+    if (frame_ % 80 == 79) filter_.CountErrorsFrom(filter_.CloneOf(mine_.front()));
     if (frame_ == 130) {
       const Similarity3 moved{1.1, ExpQuaternion({0.1, -0.2, 0.05}), {0.5, -0.1, 0.2}};
       filter_.MoveWorld(moved, robot_);
@@ -348,7 +348,7 @@ TEST(JointFilter, ACameraThatStandsStillIsFoundByWhatItSees) {
   for (int k = 0; k < 20; ++k) {
     std::vector<Observation> seen;
     for (const FeatureId id : wearer.mine()) {
-      const auto at = PixelOfAnchored(wearer.lens(), camera_now, filter.Point(id));
+      const auto at = PixelFromClone(wearer.lens(), camera_now, filter.Point(id));
       if (!at || !wearer.lens().InImage(*at) || !filter.Predicted(wearer.lens(), id, fixed)) {
         continue;
       }

@@ -19,7 +19,7 @@ class RollingShutter {
     CameraMotion motion;
     motion.velocity_m_s = {kSpeed_m_s, 0.0, 0.0};
     filter_.Reset(motion, sigma.cwiseAbs2().asDiagonal());
-    const AnchorPoseId anchor = filter_.AddAnchor();
+    const CloneId clone = filter_.AddClone();
     for (int k = 0; k < 40; ++k) {
       FeatureBirth birth;
       birth.id = static_cast<FeatureId>(k + 1);
@@ -27,7 +27,7 @@ class RollingShutter {
       birth.inverse_range = world_.Uniform(0.3, 0.8);
       birth.inverse_range_sigma = 0.01;
       birth.bearing_covariance = 1e-8 * Eigen::Matrix3d::Identity();
-      EXPECT_TRUE(filter_.AddFeature(anchor, birth).ok());
+      EXPECT_TRUE(filter_.AddFeature(clone, birth).ok());
       points_.emplace_back(birth.bearing / birth.inverse_range);
     }
   }

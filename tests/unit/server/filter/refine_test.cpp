@@ -30,7 +30,7 @@ class Scene {
   }
 
   void Born(int count) {
-    const AnchorPoseId anchor = filter_.AddAnchor();
+    const CloneId clone = filter_.AddClone();
     for (int k = 0; k < count; ++k) {
       FeatureBirth birth;
       birth.id = ++newest_;
@@ -39,7 +39,7 @@ class Scene {
       birth.inverse_range = 0.5;
       birth.inverse_range_sigma = 0.1;
       birth.bearing_covariance = 1e-6 * Eigen::Matrix3d::Identity();
-      ASSERT_TRUE(filter_.AddFeature(anchor, birth).ok());
+      ASSERT_TRUE(filter_.AddFeature(clone, birth).ok());
       points_.push_back(filter_.camera().world_from_camera * (birth.bearing / 0.5));
     }
   }
@@ -66,11 +66,11 @@ class Scene {
     for (int k = 5; k < 8; ++k) Frame(filter, k);
     const FeatureId gone[] = {4};
     filter.Remove(gone);
-    const AnchorPoseId anchor = filter.AddAnchor();
+    const CloneId clone = filter.AddClone();
     FeatureBirth birth;
     birth.id = newest_ + 1;
     birth.inverse_range = 0.7;
-    ASSERT_TRUE(filter.AddFeature(anchor, birth).ok());
+    ASSERT_TRUE(filter.AddFeature(clone, birth).ok());
     for (int k = 8; k < 10; ++k) Frame(filter, k);
   }
 
@@ -83,10 +83,10 @@ class Scene {
                     pose.translation + random.NormalVector<3>(0.01 * size)};
     };
     better.world_from_camera = moved(filter.camera().world_from_camera);
-    const AnchorPoseId clone = filter.AnchorOf(1);
-    better.anchors[clone] = moved(*filter.AnchorPose(clone));
+    const CloneId clone = filter.CloneOf(1);
+    better.clones[clone] = moved(*filter.ClonePose(clone));
     for (const FeatureId id : filter.FeatureIds()) {
-      const AnchoredPoint point = filter.Point(id);
+      const PointFromClone point = filter.Point(id);
       better.features[id] = {(point.bearing + random.NormalVector<3>(0.001 * size)).normalized(),
                              point.inverse_range * (1.0 + random.Normal(0.03 * size))};
     }
@@ -120,10 +120,10 @@ TEST(Refine, LateEqualsAtOnce) {
     const Refinement better = scene.Better(scene.filter(), size);
     FilterState plain = scene.filter(), at_once = scene.filter(), late = scene.filter();
     scene.GoOn(plain);
-    at_once.Mark();
+    at_once.SetCheckpoint();
     at_once.Refine(better);
     scene.GoOn(at_once);
-    late.Mark();
+    late.SetCheckpoint();
     scene.GoOn(late);
     late.Refine(better);
     const double effect = Distance(plain, at_once);
@@ -139,7 +139,7 @@ TEST(Refine, PutsTheEstimatesWhereTheyAreSaidToBe) {
   const Refinement better = scene.Better(scene.filter(), 1.0);
   FilterState& filter = scene.filter();
   const double trace = filter.FullCovariance().trace();
-  filter.Mark();
+  filter.SetCheckpoint();
   filter.Refine(better);
   EXPECT_LT(RotationAngle(filter.camera().world_from_camera, *better.world_from_camera), 1e-9);
   for (const auto& [id, feature] : better.features) {
@@ -155,8 +155,8 @@ TEST(Refine, WithoutAMarkNothingMoves) {
   const FilterState before = scene.filter();
   scene.filter().Refine(better);
   EXPECT_LT(Distance(before, scene.filter()), 1e-12);
-  scene.filter().Mark();
-  scene.filter().DropMark();
+  scene.filter().SetCheckpoint();
+  scene.filter().DropCheckpoint();
   scene.filter().Refine(better);
   EXPECT_LT(Distance(before, scene.filter()), 1e-12);
 }

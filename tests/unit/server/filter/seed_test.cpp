@@ -8,12 +8,12 @@ namespace {
 /// Two clones with three features, and some covariance.
 MapSeed TwoClones() {
   MapSeed seed;
-  seed.anchors = {{Eigen::Quaterniond::Identity(), {0.0, 0.0, 0.0}},
-                  {ExpQuaternion({0.0, 0.1, 0.0}), {0.2, 0.0, 0.1}}};
+  seed.clones = {{Eigen::Quaterniond::Identity(), {0.0, 0.0, 0.0}},
+                 {ExpQuaternion({0.0, 0.1, 0.0}), {0.2, 0.0, 0.1}}};
   for (int k = 0; k < 3; ++k) {
     MapSeed::Feature feature;
     feature.id = 5 + static_cast<FeatureId>(k);
-    feature.anchor = k == 2 ? 1 : 0;
+    feature.clone = k == 2 ? 1 : 0;
     feature.bearing = Eigen::Vector3d(0.1 * k, -0.05 * k, 1.0).normalized();
     feature.birth_covariance = 1e-6 * Eigen::Matrix2d::Identity();
     feature.inverse_range = 0.4 + 0.1 * k;
@@ -41,7 +41,7 @@ TEST(Seed, TheFilterIsWhatItIsGiven) {
   CameraMotion camera;
   camera.world_from_camera.translation = {0.3, 0.0, 0.1};
   const Matrix12d wide = 1e-2 * Matrix12d::Identity();
-  const std::vector<AnchorPoseId> clones = filter.Seed(seed, camera, wide);
+  const std::vector<CloneId> clones = filter.Seed(seed, camera, wide);
   ASSERT_EQ(clones.size(), 2u);
   EXPECT_EQ(filter.dim(), 12 + 1 + 12 + 9);
   EXPECT_EQ(filter.readout_s(), 0.012);
@@ -52,11 +52,11 @@ TEST(Seed, TheFilterIsWhatItIsGiven) {
   EXPECT_TRUE(full.bottomRightCorner(22, 22).isApprox(seed.covariance, 1e-12));
   for (const MapSeed::Feature& feature : seed.features) {
     ASSERT_TRUE(filter.Has(feature.id));
-    EXPECT_EQ(filter.AnchorOf(feature.id), clones[static_cast<std::size_t>(feature.anchor)]);
+    EXPECT_EQ(filter.CloneOf(feature.id), clones[static_cast<std::size_t>(feature.clone)]);
     EXPECT_EQ(filter.Point(feature.id).bearing, feature.bearing);
     EXPECT_EQ(filter.Point(feature.id).inverse_range, feature.inverse_range);
   }
-  EXPECT_EQ(filter.AnchorPose(clones[1])->translation, seed.anchors[1].translation);
+  EXPECT_EQ(filter.ClonePose(clones[1])->translation, seed.clones[1].translation);
 }
 
 TEST(Seed, WithFrozenBearingsOnlyTheRangesAreTaken) {
@@ -90,7 +90,7 @@ TEST(Seed, GoesOnLikeAnyOther) {
   EXPECT_LT(filter.PoseCovariance().trace(), before);
   const std::vector<FeatureId> gone = {5, 6};
   filter.Remove(gone);
-  EXPECT_EQ(filter.anchor_count(), 1u);
+  EXPECT_EQ(filter.clone_count(), 1u);
 }
 
 }  // namespace

@@ -27,20 +27,20 @@ class GroupConsistency : public testing::Test {
           clone.translation};
       while (std::ssize(matches_) < (group + 1) * kInGroup) {
         const Eigen::Vector2d pixel(320 + 280 * Uniform(), 240 + 200 * Uniform());
-        AnchoredPoint point;
-        point.world_from_anchor = clone;
+        PointFromClone point;
+        point.world_from_clone = clone;
         point.bearing = (clone.Inverse() * ((2.5 + 1.5 * Uniform()) * *lens.Unproject(pixel)));
         point.inverse_range = 1.0 / point.bearing.norm();
         point.bearing.normalize();
         point.basis = TangentBasis(point.bearing);
-        AnchoredPoint seen = point;
-        seen.world_from_anchor = real;
-        const auto at = PredictAnchored(lens, thought, point);
-        const auto found = PredictAnchored(lens, truth, seen);
+        PointFromClone seen = point;
+        seen.world_from_clone = real;
+        const auto at = PredictFromClone(lens, thought, point);
+        const auto found = PredictFromClone(lens, truth, seen);
         if (!at || !found) continue;
         const Eigen::Vector2d noise(0.3 * Uniform(), 0.3 * Uniform());
         matches_.push_back(
-            {group, found->pixel + noise - at->pixel, at->d_camera, at->d_anchor.rightCols<3>()});
+            {group, found->pixel + noise - at->pixel, at->d_camera, at->d_clone.rightCols<3>()});
       }
     }
   }

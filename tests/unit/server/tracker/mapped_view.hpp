@@ -20,7 +20,7 @@ class MappedView {
 
   /// Starts a feature ahead of the camera in `clone`; its inverse range is 1 / m, known to
   /// `relative_sigma`.
-  FeatureId Plant(AnchorPoseId clone, double relative_sigma) {
+  FeatureId Plant(CloneId clone, double relative_sigma) {
     FeatureBirth birth;
     birth.id = map.in_use().NextId();
     const double turn = 0.02 * static_cast<double>(birth.id % 17) - 0.16;

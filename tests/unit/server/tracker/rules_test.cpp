@@ -19,7 +19,7 @@ constexpr double kWell = 0.01, kBadly = 0.5;  // sigma / inverse range
 
 TEST(WantedHome, FollowsTheCameraOnceHardlyAnythingWasSeenFromHome) {
   MappedView view;
-  const AnchorPoseId first = view.filter.AddAnchor(), second = view.filter.AddAnchor();
+  const CloneId first = view.filter.AddClone(), second = view.filter.AddClone();
   std::vector<FeatureId> old, young;
   for (int k = 0; k < 4; ++k) old.push_back(view.Plant(first, kWell));
   for (int k = 0; k < 4; ++k) young.push_back(view.Plant(second, kWell));
@@ -34,7 +34,7 @@ TEST(WantedHome, FollowsTheCameraOnceHardlyAnythingWasSeenFromHome) {
 
 TEST(WantedHome, StaysWhileThePlaceIsKnown) {
   MappedView view;
-  const AnchorPoseId first = view.filter.AddAnchor(), second = view.filter.AddAnchor();
+  const CloneId first = view.filter.AddClone(), second = view.filter.AddClone();
   view.Plant(first, kWell);
   view.See(view.Plant(second, kWell));
   const HomeOptions options{.least_share = 0.3};
@@ -45,7 +45,7 @@ TEST(WantedHome, StaysWhileThePlaceIsKnown) {
 
 TEST(WantedHome, NeverMovesWithoutAShare) {
   MappedView view;
-  const AnchorPoseId first = view.filter.AddAnchor(), second = view.filter.AddAnchor();
+  const CloneId first = view.filter.AddClone(), second = view.filter.AddClone();
   view.Plant(first, kWell);
   view.See(view.Plant(second, kWell));
   EXPECT_EQ(WantedHome(view.matches, view.filter, first, {.least_share = 0.0}), std::nullopt);
@@ -53,7 +53,7 @@ TEST(WantedHome, NeverMovesWithoutAShare) {
 
 TEST(Settling, WaitsForDepthButNotForever) {
   MappedView view;
-  const AnchorPoseId clone = view.filter.AddAnchor();
+  const CloneId clone = view.filter.AddClone();
   const SettlingOptions options{.known_features = 3, .longest_frames = 10};
   for (int k = 0; k < 2; ++k) view.See(view.Plant(clone, kWell));
   for (int k = 0; k < 5; ++k) view.See(view.Plant(clone, kBadly));
@@ -98,7 +98,7 @@ class Resting : public ::testing::Test {
  protected:
   /// A feature with so many matches, in a map that kept the keyframe it was born in.
   FeatureId Grown(std::uint32_t matched, double relative_sigma = kWell) {
-    const FeatureId id = view_.Plant(view_.filter.AddAnchor(), relative_sigma);
+    const FeatureId id = view_.Plant(view_.filter.AddClone(), relative_sigma);
     view_.Keep();
     view_.Of(id).matched = matched;
     return id;
