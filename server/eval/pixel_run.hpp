@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "server/eval/claims.hpp"
+#include "server/eval/eval_wearable.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/scale_windows.hpp"
 #include "server/eval/statistics.hpp"
-#include "server/eval/eval_wearable.hpp"
 #include "server/sim/sim_source.hpp"
 
 namespace saccade {

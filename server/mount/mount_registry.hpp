@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "server/mount/simulated_head.hpp"
 #include "server/mount/mount.hpp"
 #include "server/mount/mount_options.hpp"
+#include "server/mount/simulated_head.hpp"
 #include "shared/camera/camera_model.hpp"
 
 namespace saccade {
@@ -33,7 +33,7 @@ struct MountContext {
 
 struct OpenedMount {
   std::shared_ptr<Mount> mount;          // null: the camera is fixed to the wearer
-  std::shared_ptr<SimulatedHead> head;      // what turns a simulated camera; null: a real one
+  std::shared_ptr<SimulatedHead> head;   // what turns a simulated camera; null: a real one
   std::optional<CameraIntrinsics> crop;  // digital gaze: what the mount turns
 };
 

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "server/mount/encoder_ring.hpp"
-#include "server/mount/simulated_head.hpp"
 #include "server/mount/mount.hpp"
+#include "server/mount/simulated_head.hpp"
 
 namespace saccade {
 
