@@ -6,9 +6,14 @@ namespace saccade {
 
 // What callers may give of an annotation. The wire checks it where it arrives, with the field's
 // name; who places and keeps it does so again, whoever asked.
-inline constexpr double kMaxCoordinateM = 1e4;  // of each coordinate of a point in world [m]
+
+/// Of each coordinate of a point in world, either way [m].
+inline constexpr double kMaxCoordinateM = 1e4;
+/// Edge of a cube, length of an arrow [m].
 inline constexpr double kMaxSizeM = 10.0;
+/// Of a note's text, UTF-8.
 inline constexpr std::size_t kMaxTextBytes = 500;
+/// Of one stroke.
 inline constexpr std::size_t kMaxInkPoints = 2000;
 
 }  // namespace saccade
