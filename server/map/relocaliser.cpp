@@ -20,9 +20,9 @@ constexpr FeatureId kCornerBit = FeatureId{1} << 63;
 // room, right poses have 30 or more of the latter.
 constexpr int kCornersByDescriptor = 12, kCornersGuided = 24;
 constexpr int kLeastFeatures = 4;
-constexpr std::size_t kCornerCandidates = 5;  // keyframes: matching many corners takes its time
+constexpr std::size_t kCornerCandidates = 5;  // views: matching many corners takes its time
 
-std::optional<Eigen::Vector3d> PointNow(const KeyframePoint& point,
+std::optional<Eigen::Vector3d> PointNow(const ViewPoint& point,
                                         const Relocaliser::PointLookup& lookup) {
   const std::optional<Eigen::Vector3d> now =
       lookup ? lookup(point.id) : std::make_optional(point.point_in_world);
@@ -45,11 +45,11 @@ double Spread(const std::vector<Correspondence>& inliers) {
 }  // namespace
 
 absl::Status RelocaliserOptions::Validate() const {
-  if (max_keyframes < 1 || max_points < min_inliers || max_corners < min_inliers ||
-      scene_corners < 0 || candidates < 1 || !(ratio > 0 && ratio <= 1) || max_hamming < 1 ||
-      max_hamming > 255 || min_inliers < 6 || !(inlier_px > 0)) {
+  if (max_views < 1 || max_points < min_inliers || max_corners < min_inliers || scene_corners < 0 ||
+      candidates < 1 || !(ratio > 0 && ratio <= 1) || max_hamming < 1 || max_hamming > 255 ||
+      min_inliers < 6 || !(inlier_px > 0)) {
     return absl::InvalidArgumentError(
-        "map.relocaliser: max_keyframes and candidates at least 1, max_points and max_corners at "
+        "map.relocaliser: max_views and candidates at least 1, max_points and max_corners at "
         "least min_inliers, scene_corners 0 or more, min_inliers at least 6, ratio in (0, 1], "
         "max_hamming 1 to 255, "
         "inlier_px above 0");
@@ -62,7 +62,7 @@ Relocaliser::Relocaliser(const RelocaliserOptions& options) : options_(options) 
 std::vector<int> Relocaliser::Shortlist(const cv::Mat& thumbnail,
                                         const std::vector<DescribedPoint>& corners,
                                         const Scene& scene) const {
-  const int count = static_cast<int>(keyframes_.size());
+  const int count = static_cast<int>(views_.size());
   std::vector<int> order;
   for (int k = 0; k < count; ++k) {
     if (static_cast<int>(scene[k].size()) >= kLeastFeatures) order.push_back(k);
@@ -72,9 +72,9 @@ std::vector<int> Relocaliser::Shortlist(const cv::Mat& thumbnail,
   const std::size_t voters = std::min<std::size_t>(corners.size(), kVotingCorners);
   std::vector<double> likeness(count);
   for (const int k : order) {
-    const Keyframe& keyframe = keyframes_[k];
+    const PlaceView& view = views_[k];
     int votes = 0;
-    for (const DescribedPoint& point : keyframe.described) {
+    for (const DescribedPoint& point : view.described) {
       if (!point.present[1]) continue;
       votes += std::any_of(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(voters),
                            [&](const DescribedPoint& corner) {
@@ -84,8 +84,8 @@ std::vector<int> Relocaliser::Shortlist(const cv::Mat& thumbnail,
                    ? 1
                    : 0;
     }
-    likeness[k] = votes / std::sqrt(static_cast<double>(keyframe.points.size())) +
-                  2.0 * std::max(0.0, thumbnail.dot(keyframe.thumbnail));
+    likeness[k] = votes / std::sqrt(static_cast<double>(view.points.size())) +
+                  2.0 * std::max(0.0, thumbnail.dot(view.thumbnail));
   }
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return likeness[a] > likeness[b]; });
@@ -93,32 +93,32 @@ std::vector<int> Relocaliser::Shortlist(const cv::Mat& thumbnail,
   return order;
 }
 
-std::vector<Relocaliser::Known> Relocaliser::KnownFeatures(const Keyframe& keyframe,
+std::vector<Relocaliser::Known> Relocaliser::KnownFeatures(const PlaceView& view,
                                                            const PointLookup& lookup) const {
   std::vector<Known> known;
-  for (std::size_t k = 0; k < keyframe.points.size(); ++k) {
-    const auto point = PointNow(keyframe.points[k], lookup);
-    if (point) known.push_back({keyframe.points[k].id, &keyframe.described[k], *point});
+  for (std::size_t k = 0; k < view.points.size(); ++k) {
+    const auto point = PointNow(view.points[k], lookup);
+    if (point) known.push_back({view.points[k].id, &view.described[k], *point});
   }
   return known;
 }
 
 void Relocaliser::AppendCorners(int index, const CameraModel& camera, const PointLookup& lookup,
                                 std::vector<Known>& known) const {
-  const Keyframe& keyframe = keyframes_[index];
-  if (keyframe.corners.described.empty()) return;
-  const auto pose = PoseNow(keyframe, camera, lookup);
+  const PlaceView& view = views_[index];
+  if (view.corners.described.empty()) return;
+  const auto pose = PoseNow(view, camera, lookup);
   if (!pose) return;
   const FeatureId first = kCornerBit | static_cast<FeatureId>(index) << 32;
-  for (std::size_t k = 0; k < keyframe.corners.described.size(); ++k) {
-    const double range = keyframe.corners.ranges_m[k];
+  for (std::size_t k = 0; k < view.corners.described.size(); ++k) {
+    const double range = view.corners.ranges_m[k];
     if (range <= 0) continue;
-    known.push_back({first | k, &keyframe.corners.described[k],
-                     *pose * (range * keyframe.corners.bearings[k])});
+    known.push_back(
+        {first | k, &view.corners.described[k], *pose * (range * view.corners.bearings[k])});
   }
 }
 
-std::vector<Relocaliser::Match> Relocaliser::MatchKeyframe(
+std::vector<Relocaliser::Match> Relocaliser::MatchView(
     const std::vector<Known>& known, const std::vector<DescribedPoint>& corners) const {
   std::map<int, std::pair<int, Match>> by_corner;  // a corner shows one feature: the nearest
   std::vector<int> distances(corners.size());
@@ -153,8 +153,8 @@ std::vector<Relocaliser::Match> Relocaliser::MatchGuided(const Rigid3& world_fro
   const Rigid3 camera_from_world = world_from_camera.Inverse();
   std::map<FeatureId, std::pair<int, Match>> by_feature;
   const int limit = static_cast<int>(kGuidedSlack * options_.max_hamming);
-  for (const std::vector<Known>& keyframe : scene) {
-    for (const Known& one : keyframe) {
+  for (const std::vector<Known>& view : scene) {
+    for (const Known& one : view) {
       const auto predicted = camera.Project(camera_from_world * one.point_in_world);
       if (!predicted || !camera.InImage(*predicted)) continue;
       for (std::size_t c = 0; c < corners.size(); ++c) {
@@ -175,8 +175,8 @@ std::vector<Relocaliser::Match> Relocaliser::MatchGuided(const Rigid3& world_fro
   return matches;
 }
 
-std::optional<Relocalisation> Relocaliser::Confirm(const std::vector<Match>& matches,
-                                                   FrameId keyframe, const CameraModel& camera,
+std::optional<Relocalisation> Relocaliser::Confirm(const std::vector<Match>& matches, FrameId view,
+                                                   const CameraModel& camera,
                                                    const std::vector<DescribedPoint>& corners,
                                                    const Scene& scene, const Bar& bar) const {
   const auto solve = [&](const std::vector<Match>& used, int least) {
@@ -205,7 +205,7 @@ std::optional<Relocalisation> Relocaliser::Confirm(const std::vector<Match>& mat
   Relocalisation found;
   found.world_from_camera = second->fit.world_from_camera;
   found.pose_covariance = second->fit.covariance;
-  found.keyframe = keyframe;
+  found.view = view;
   double squared = 0;
   std::vector<Correspondence> seen_again;
   for (const int k : second->inliers) {
@@ -225,7 +225,7 @@ std::optional<Relocalisation> Relocaliser::Confirm(const std::vector<Match>& mat
 
 std::optional<Relocalisation> Relocaliser::Query(const cv::Mat& grey, const CameraModel& camera,
                                                  const PointLookup& lookup) const {
-  if (keyframes_.empty() || grey.type() != CV_8UC1 || grey.cols != camera.width() ||
+  if (views_.empty() || grey.type() != CV_8UC1 || grey.cols != camera.width() ||
       grey.rows != camera.height()) {
     return std::nullopt;
   }
@@ -233,7 +233,7 @@ std::optional<Relocalisation> Relocaliser::Query(const cv::Mat& grey, const Came
   if (static_cast<int>(pixels.size()) < options_.min_inliers) return std::nullopt;
   const std::vector<DescribedPoint> corners = DescribePixels(grey, pixels);
   Scene scene;
-  for (const Keyframe& keyframe : keyframes_) scene.push_back(KnownFeatures(keyframe, lookup));
+  for (const PlaceView& view : views_) scene.push_back(KnownFeatures(view, lookup));
   std::vector<int> candidates = Shortlist(Thumbnail(grey), corners, scene);
   if (candidates.empty()) return std::nullopt;
   auto found = TryCandidates(candidates, scene, camera, corners,
@@ -258,16 +258,16 @@ std::optional<Relocalisation> Relocaliser::TryCandidates(const std::vector<int>&
   std::vector<Match> pooled;
   std::set<int> taken;
   for (const int k : candidates) {
-    const std::vector<Match> matches = MatchKeyframe(scene[k], corners);
-    auto found = Confirm(matches, keyframes_[k].frame, camera, corners, scene, bar);
+    const std::vector<Match> matches = MatchView(scene[k], corners);
+    auto found = Confirm(matches, views_[k].frame, camera, corners, scene, bar);
     if (found) return found;
     for (const Match& match : matches) {
       if (taken.insert(match.corner).second) pooled.push_back(match);
     }
   }
-  // A view between keyframes may have a few features of each.
+  // A view between views may have a few features of each.
   if (candidates.size() < 2) return std::nullopt;
-  return Confirm(pooled, keyframes_[candidates.front()].frame, camera, corners, scene, bar);
+  return Confirm(pooled, views_[candidates.front()].frame, camera, corners, scene, bar);
 }
 
 }  // namespace saccade

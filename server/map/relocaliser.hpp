@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "server/features/pose_fit.hpp"
-#include "server/map/keyframe_corners.hpp"
 #include "server/map/picture_description.hpp"
+#include "server/map/view_corners.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
 #include "shared/geometry/similarity3.hpp"
@@ -22,11 +22,11 @@
 namespace saccade {
 
 struct RelocaliserOptions {
-  int max_keyframes = 100;  // beyond, the most redundant one is dropped
-  int max_points = 500;     // of a keyframe
-  int scene_corners = 500;  // of a keyframe, looked for by Densify()
+  int max_views = 100;      // beyond, the most redundant one is dropped
+  int max_points = 500;     // of a view
+  int scene_corners = 500;  // of a view, looked for by Densify()
   int max_corners = 700;    // described in the queried picture
-  int candidates = 8;       // keyframes tried in full, best thumbnails first
+  int candidates = 8;       // views tried in full, best thumbnails first
   double ratio = 0.75;      // best / second-best descriptor distance
   int max_hamming = 64;     // of 256
   int min_inliers = 12;     // two thirds of them by descriptor alone
@@ -35,8 +35,8 @@ struct RelocaliserOptions {
   absl::Status Validate() const;
 };
 
-/// A map feature as seen in a keyframe.
-struct KeyframePoint {
+/// A map feature as seen in a view.
+struct ViewPoint {
   FeatureId id = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();           // [px, distorted]
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m] then; may move later
@@ -53,17 +53,17 @@ struct Relocalisation {
   Rigid3 world_from_camera;
   Matrix6d pose_covariance = Matrix6d::Zero();  // of the PnP alone: never insert it (slam-spec 6)
   std::vector<Correspondence> inliers;          // each id once
-  FrameId keyframe = 0;                         // that led to it
+  FrameId view = 0;                             // that led to it
   double rms_px = 0.0;
 };
 
-/// Finds where the camera is after tracking was lost, from keyframes of the map.
+/// Finds where the camera is after tracking was lost, from views of the map.
 ///
-/// Each keyframe keeps a thumbnail and, for each map feature visible in it, ORB descriptors at
+/// Each view keeps a thumbnail and, for each map feature visible in it, ORB descriptors at
 /// several scales. A query matches them to corners of the picture, best thumbnails first, and
 /// accepts a pose that at least `min_inliers` features support; failing that, one that 24 features
-/// and corners of the keyframes' pictures support, which Densify() triangulates. Memory: about 160
-/// bytes a point or corner and 5 KB a keyframe, and its picture until Densify() was there.
+/// and corners of the views' pictures support, which Densify() triangulates. Memory: about 160
+/// bytes a point or corner and 5 KB a view, and its picture until Densify() was there.
 /// One thread (the tracker's).
 class Relocaliser {
  public:
@@ -74,47 +74,47 @@ class Relocaliser {
 
   /// Stores a view of the map; about 2 ms. Points less than 20 px from the border are left out.
   /// InvalidArgument: not 8-bit grey, or fewer than `min_inliers` usable points.
-  absl::Status AddKeyframe(FrameId frame, const cv::Mat& grey, const Rigid3& world_from_camera,
-                           std::span<const KeyframePoint> points);
+  absl::Status AddView(FrameId frame, const cv::Mat& grey, const Rigid3& world_from_camera,
+                       std::span<const ViewPoint> points);
 
-  /// True if no keyframe shows the map from near this pose: worth an AddKeyframe().
-  bool NeedsKeyframe(const Rigid3& world_from_camera, double min_distance_m,
-                     double min_angle_rad) const;
+  /// True if no view shows the map from near this pose: worth an AddView().
+  bool NeedsView(const Rigid3& world_from_camera, double min_distance_m,
+                 double min_angle_rad) const;
 
   /// Pose and supporting features of the picture, or nothing. `lookup` null: points are where they
-  /// were when the keyframe was added. Typically below 30 ms at 640 x 480.
+  /// were when the view was added. Typically below 30 ms at 640 x 480.
   std::optional<Relocalisation> Query(const cv::Mat& grey, const CameraModel& camera,
                                       const PointLookup& lookup = nullptr) const;
 
-  /// One step (a few ms) towards more points than the map's features: corners of the keyframes'
+  /// One step (a few ms) towards more points than the map's features: corners of the views'
   /// pictures, triangulated between them. They help to recognise a place and are never returned;
-  /// they move with their keyframe's features. False: nothing is left to do.
+  /// they move with their view's features. False: nothing is left to do.
   bool Densify(const CameraModel& camera, const PointLookup& lookup = nullptr);
 
   /// The map was moved: `moved` says how what lies at a feature moves; nothing if it was deleted.
   void Move(const std::function<std::optional<Similarity3>(FeatureId)>& moved);
 
-  void Clear() { keyframes_.clear(); }
-  std::size_t size() const { return keyframes_.size(); }
+  void Clear() { views_.clear(); }
+  std::size_t size() const { return views_.size(); }
 
  private:
-  struct Keyframe {
+  struct PlaceView {
     FrameId frame = 0;
     Rigid3 world_from_camera;
     cv::Mat thumbnail;
-    std::vector<KeyframePoint> points;
+    std::vector<ViewPoint> points;
     std::vector<DescribedPoint> described;  // of points
     cv::Mat grey;                           // until its corners are described
-    KeyframeCorners corners;
-    std::vector<FrameId> partners;  // keyframes its corners are yet to be matched to
+    ViewCorners corners;
+    std::vector<FrameId> partners;  // views its corners are yet to be matched to
   };
-  /// A feature or a corner of a keyframe, where it is now.
+  /// A feature or a corner of a view, where it is now.
   struct Known {
     FeatureId id = 0;  // a corner: kCornerBit and its place
     const DescribedPoint* look = nullptr;
     Eigen::Vector3d point_in_world;
   };
-  using Scene = std::vector<std::vector<Known>>;  // by keyframe
+  using Scene = std::vector<std::vector<Known>>;  // by view
   struct Match {
     FeatureId id = 0;
     int corner = 0;  // into the picture's described corners
@@ -127,20 +127,20 @@ class Relocaliser {
     int guided = 0;         // near where the pose predicts them
   };
 
-  /// Keyframes most like the picture, best first, at most options.candidates; none of which too
+  /// Views most like the picture, best first, at most options.candidates; none of which too
   /// little is known in `scene`.
   std::vector<int> Shortlist(const cv::Mat& thumbnail, const std::vector<DescribedPoint>& corners,
                              const Scene& scene) const;
-  /// Where the keyframe was taken, by where its features are now; nothing if they disagree.
-  std::optional<Rigid3> PoseNow(const Keyframe& keyframe, const CameraModel& camera,
+  /// Where the view was taken, by where its features are now; nothing if they disagree.
+  std::optional<Rigid3> PoseNow(const PlaceView& view, const CameraModel& camera,
                                 const PointLookup& lookup) const;
-  std::vector<Known> KnownFeatures(const Keyframe& keyframe, const PointLookup& lookup) const;
-  void AppendCorners(int keyframe, const CameraModel& camera, const PointLookup& lookup,
+  std::vector<Known> KnownFeatures(const PlaceView& view, const PointLookup& lookup) const;
+  void AppendCorners(int view, const CameraModel& camera, const PointLookup& lookup,
                      std::vector<Known>& known) const;
-  std::vector<Match> MatchKeyframe(const std::vector<Known>& known,
-                                   const std::vector<DescribedPoint>& corners) const;
+  std::vector<Match> MatchView(const std::vector<Known>& known,
+                               const std::vector<DescribedPoint>& corners) const;
   /// The pose that `matches` agree on, checked against the whole scene; nothing if in doubt.
-  std::optional<Relocalisation> Confirm(const std::vector<Match>& matches, FrameId keyframe,
+  std::optional<Relocalisation> Confirm(const std::vector<Match>& matches, FrameId view,
                                         const CameraModel& camera,
                                         const std::vector<DescribedPoint>& corners,
                                         const Scene& scene, const Bar& bar) const;
@@ -150,16 +150,16 @@ class Relocaliser {
                                  const Scene& scene) const;
   void DropMostRedundant();
 
-  void ChoosePartners(Keyframe& keyframe) const;
+  void ChoosePartners(PlaceView& view) const;
   /// Each candidate's matches in turn, then all of them together.
   std::optional<Relocalisation> TryCandidates(const std::vector<int>& candidates,
                                               const Scene& scene, const CameraModel& camera,
                                               const std::vector<DescribedPoint>& corners,
                                               const Bar& bar) const;
-  Keyframe* Find(FrameId frame);
+  PlaceView* Find(FrameId frame);
 
   RelocaliserOptions options_;
-  std::vector<Keyframe> keyframes_;
+  std::vector<PlaceView> views_;
 };
 
 }  // namespace saccade

@@ -70,9 +70,9 @@ class Recording {
   std::vector<Rigid3> truth_;
 };
 
-inline std::shared_ptr<const CameraModel> Lens(LensModel model, int width, int height, double fx,
-                                               double fy, double cx, double cy,
-                                               const std::array<double, 5>& distortion) {
+inline std::shared_ptr<const CameraModel> MakeLens(LensModel model, int width, int height,
+                                                   double fx, double fy, double cx, double cy,
+                                                   const std::array<double, 5>& distortion) {
   CameraIntrinsics k;
   k.model = model;
   k.width = width;
@@ -86,15 +86,15 @@ inline std::shared_ptr<const CameraModel> Lens(LensModel model, int width, int h
 }
 
 inline std::shared_ptr<const CameraModel> CheckerboardCamera() {
-  return Lens(LensModel::kBrownConrady, 752, 480, 420.506712, 420.61094, 355.208298, 250.336787,
-              {-0.296681, 0.080857, 0, 0, 0});
+  return MakeLens(LensModel::kBrownConrady, 752, 480, 420.506712, 420.61094, 355.208298, 250.336787,
+                  {-0.296681, 0.080857, 0, 0, 0});
 }
 inline std::shared_ptr<const CameraModel> DeskCamera() {
-  return Lens(LensModel::kRadial1, 320, 240, 195, 195, 162, 125, {9.0e-6});
+  return MakeLens(LensModel::kRadial1, 320, 240, 195, 195, 162, 125, {9.0e-6});
 }
 inline std::shared_ptr<const CameraModel> TumCamera() {
-  return Lens(LensModel::kBrownConrady, 640, 480, 517.3, 516.5, 318.6, 255.3,
-              {0.2624, -0.9531, -0.0054, 0.0026, 1.1633});
+  return MakeLens(LensModel::kBrownConrady, 640, 480, 517.3, 516.5, 318.6, 255.3,
+                  {0.2624, -0.9531, -0.0054, 0.0026, 1.1633});
 }
 
 }  // namespace saccade

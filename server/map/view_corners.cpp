@@ -1,4 +1,4 @@
-#include "server/map/keyframe_corners.hpp"
+#include "server/map/view_corners.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -36,7 +36,7 @@ struct Pair {
 /// The corner of the second picture on the epipolar line of a place that looks like it, if one does
 /// far more than the others. `normal` [unit, world] is of the epipolar plane.
 Pair BestOnLine(const DescribedPoint& place, const Eigen::Vector3d& normal, double gate,
-                const KeyframeCorners& second, const std::vector<Eigen::Vector3d>& rays) {
+                const ViewCorners& second, const std::vector<Eigen::Vector3d>& rays) {
   Pair best;
   std::vector<Pair> line;
   for (std::size_t b = 0; b < rays.size(); ++b) {
@@ -75,9 +75,9 @@ std::vector<Eigen::Vector2d> PlacesToDescribe(const cv::Mat& grey, int count) {
   return pixels;
 }
 
-KeyframeCorners DescribeCorners(const cv::Mat& grey, const CameraModel& camera,
-                                const std::vector<Eigen::Vector2d>& taken, int count) {
-  KeyframeCorners corners;
+ViewCorners DescribeCorners(const cv::Mat& grey, const CameraModel& camera,
+                            const std::vector<Eigen::Vector2d>& taken, int count) {
+  ViewCorners corners;
   std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector2d& pixel : PlacesToDescribe(grey, count)) {
     if (std::any_of(taken.begin(), taken.end(), [&](const Eigen::Vector2d& other) {

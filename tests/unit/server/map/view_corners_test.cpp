@@ -1,4 +1,4 @@
-#include "server/map/keyframe_corners.hpp"
+#include "server/map/view_corners.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace saccade {
 namespace {
 
 /// Two pictures of 100 places between 1 and 3 m away, each with a look of its own.
-class KeyframeCornersTest : public ::testing::Test {
+class ViewCornersTest : public ::testing::Test {
  protected:
   void SetUp() override {
     second_pose_.translation = {0.15, 0.02, -0.03};
@@ -31,7 +31,7 @@ class KeyframeCornersTest : public ::testing::Test {
       points_.push_back(point);
     }
   }
-  void Add(const Eigen::Vector2d& pixel, const Descriptor& look, KeyframeCorners& corners) {
+  void Add(const Eigen::Vector2d& pixel, const Descriptor& look, ViewCorners& corners) {
     DescribedPoint place;
     place.pixel = pixel;
     place.descriptors[0] = look;
@@ -46,11 +46,11 @@ class KeyframeCornersTest : public ::testing::Test {
 
   const std::shared_ptr<const CameraModel> camera_ = TumCamera();
   Rigid3 second_pose_;
-  KeyframeCorners first_, second_;
+  ViewCorners first_, second_;
   std::vector<Eigen::Vector3d> points_;
 };
 
-TEST_F(KeyframeCornersTest, RangesAreFound) {
+TEST_F(ViewCornersTest, RangesAreFound) {
   EXPECT_GE(Triangulate(), 95);  // few are too near to a place that shares their line
   int known = 0;
   for (std::size_t k = 0; k < points_.size(); ++k) {
@@ -62,7 +62,7 @@ TEST_F(KeyframeCornersTest, RangesAreFound) {
   EXPECT_GE(known, 95);
 }
 
-TEST_F(KeyframeCornersTest, TwoThatLookAlikeOnOneLineAreLeftOut) {
+TEST_F(ViewCornersTest, TwoThatLookAlikeOnOneLineAreLeftOut) {
   // Far along the epipolar line of place 0: what it would show from another range.
   const Eigen::Vector3d other = 0.6 * points_[0];
   const auto pixel = camera_->Project(second_pose_.Inverse() * other);
@@ -73,7 +73,7 @@ TEST_F(KeyframeCornersTest, TwoThatLookAlikeOnOneLineAreLeftOut) {
   EXPECT_GT(first_.ranges_m[1] + first_.ranges_m[2], 0.0);
 }
 
-TEST_F(KeyframeCornersTest, WhatMissesItsLineIsLeftOut) {
+TEST_F(ViewCornersTest, WhatMissesItsLineIsLeftOut) {
   const Eigen::Vector2d moved = second_.described[0].pixel + Eigen::Vector2d(0, 12);
   second_.described[0].pixel = moved;
   second_.bearings[0] = camera_->Unproject(moved)->normalized();
@@ -81,7 +81,7 @@ TEST_F(KeyframeCornersTest, WhatMissesItsLineIsLeftOut) {
   EXPECT_EQ(first_.ranges_m[0], 0.0);
 }
 
-TEST_F(KeyframeCornersTest, WithoutParallaxNothingIsKnown) {
+TEST_F(ViewCornersTest, WithoutParallaxNothingIsKnown) {
   second_pose_.translation *= 0.01;
   EXPECT_EQ(Triangulate(), 0);
 }

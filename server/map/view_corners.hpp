@@ -12,7 +12,7 @@ namespace saccade {
 
 /// Corners of a picture that are no features of the map; their points are known once another
 /// picture has shown them from elsewhere. One entry of each list per corner.
-struct KeyframeCorners {
+struct ViewCorners {
   std::vector<DescribedPoint> described;
   std::vector<Eigen::Vector3d> bearings;  // unit, camera
   std::vector<double> ranges_m;           // along the bearing; 0: not known
@@ -22,13 +22,13 @@ struct KeyframeCorners {
 std::vector<Eigen::Vector2d> PlacesToDescribe(const cv::Mat& grey, int count);
 
 /// The `count` best corners of `grey`, none nearer than 5 px to `taken`.
-KeyframeCorners DescribeCorners(const cv::Mat& grey, const CameraModel& camera,
-                                const std::vector<Eigen::Vector2d>& taken, int count);
+ViewCorners DescribeCorners(const cv::Mat& grey, const CameraModel& camera,
+                            const std::vector<Eigen::Vector2d>& taken, int count);
 
 /// A picture's corners and where it was taken from.
 struct CornerView {
   Rigid3 world_from_camera;
-  KeyframeCorners* corners;
+  ViewCorners* corners;
 };
 
 /// Matches corners of two pictures along their epipolar lines and sets the ranges of those that
