@@ -7,7 +7,7 @@
 #include <iostream>
 
 #include "server/eval/output_file.hpp"
-#include "server/eval/points_filter.hpp"
+#include "server/eval/points_tracker.hpp"
 #include "server/eval/registration.hpp"
 #include "server/eval/statistics.hpp"
 #include "server/eval/xyz_filter.hpp"
@@ -71,17 +71,18 @@ absl::StatusOr<Json> RunFormsScenario(const SimArguments& arguments) {
   options.duration_s = arguments.duration_s;
   for (int run = 0; run < arguments.runs; ++run) {
     options.seed = arguments.seed + static_cast<std::uint64_t>(run);
-    options.range_only = false;
     const PointsWorld world = MakePointsWorld(options);
     const std::size_t frames = world.frames.size();
     XyzFilter reference(world, options);
     RunForm(
         frames, [&](std::size_t i) { return reference.Step(i); }, xyz);
     for (Form* form : {&sid, &esid}) {
-      options.range_only = form == &esid;
-      PointsFilter filter(world, options, PointsMode::kSlam);
+      PointsSetup setup = MakeConsistencySetup(options);
+      setup.tracker.range_only = form == &esid;
+      auto tracker = PointsTracker::Create(world, options, setup, world.frames.front());
+      if (!tracker.ok()) return tracker.status();
       RunForm(
-          frames, [&](std::size_t i) { return filter.Step(i); }, *form);
+          frames, [&](std::size_t i) { return tracker->Step(world.frames[i]); }, *form);
     }
     std::cerr << absl::StrFormat("run %d of %d done\n", run + 1, arguments.runs);
   }

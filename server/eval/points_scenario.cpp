@@ -8,7 +8,7 @@
 
 #include "server/eval/consistency.hpp"
 #include "server/eval/output_file.hpp"
-#include "server/eval/points_filter.hpp"
+#include "server/eval/points_tracker.hpp"
 #include "server/eval/registration.hpp"
 #include "server/eval/run.hpp"
 #include "server/eval/run_recorder.hpp"
@@ -19,19 +19,20 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// One way to run the filter, with what all runs of it added up to.
+/// One way to run the tracker, with what all runs of it added up to.
 struct Variant {
-  Variant(PointsMode run_mode, const char* run_name, std::size_t steps)
-      : mode(run_mode), name(run_name), consistency(steps) {}
-  PointsMode mode;
+  Variant(const char* run_name, std::size_t steps) : name(run_name), consistency(steps) {}
   const char* name;
+  bool known_map = false;  // localisation only (T39)
+  bool fej = false;        // Jacobians at first estimates (T40)
+  bool adjust = false;     // bundle adjustment beside the filter, as the product runs
   ConsistencyTally consistency;
   Sample ates_m, rotations_deg, features;
   std::uint64_t frames = 0, lost_frames = 0, broken_runs = 0;
 };
 
-/// The files of a run hold the full SLAM with first-estimates Jacobians: what the product does.
-constexpr PointsMode kRecorded = PointsMode::kSlamFej;
+/// The files of a run hold this variant: what the product does.
+constexpr const char* kRecorded = "slam_adjusted";
 
 absl::Status WriteTruth(const PointsWorld& world, const std::filesystem::path& folder) {
   absl::StatusOr<OutputFile> file = OutputFile::Create(folder / "groundtruth.txt");
@@ -46,7 +47,7 @@ absl::Status WriteTruth(const PointsWorld& world, const std::filesystem::path& f
 }
 
 /// A frame and snapshot as the recorder takes them.
-absl::Status Record(const PointsFilter& filter, const PointsStep& step, std::size_t index,
+absl::Status Record(const PointsTracker& tracker, const PointsStep& step, std::size_t index,
                     double dt_s, const FrameCost& cost, RunRecorder& recorder) {
   Frame frame;
   frame.id = index;
@@ -55,8 +56,8 @@ absl::Status Record(const PointsFilter& filter, const PointsStep& step, std::siz
   snapshot.status = TrackingStatus::kTracking;
   snapshot.metric = true;
   snapshot.attempted = snapshot.matched = step.matches;
-  snapshot.world_from_camera = filter.filter().camera().world_from_camera;
-  snapshot.features.resize(filter.filter().feature_count());
+  snapshot.world_from_camera = tracker.tracker().filter().camera().world_from_camera;
+  snapshot.features.resize(tracker.tracker().filter().feature_count());
   const bool lost =
       step.position_error_m > kLostPosition_m || step.rotation_error_rad > kLostRotation_rad;
   return recorder.Add(frame, snapshot, cost,
@@ -66,16 +67,21 @@ absl::Status Record(const PointsFilter& filter, const PointsStep& step, std::siz
 absl::Status RunVariant(const PointsWorld& world, const PointsOptions& options,
                         const std::filesystem::path& folder, OutputFile& steps_file,
                         Variant& variant) {
-  PointsFilter filter(world, options, variant.mode);
+  PointsSetup setup = MakeConsistencySetup(options);
+  setup.known_map = variant.known_map;
+  setup.tracker.fej = variant.fej;
+  setup.tracker.adjust = variant.adjust;
+  auto tracker = PointsTracker::Create(world, options, setup, world.frames.front());
+  if (!tracker.ok()) return tracker.status();
   absl::StatusOr<RunRecorder> recorder = absl::NotFoundError("not recorded");
-  if (variant.mode == kRecorded) {
+  if (absl::string_view(variant.name) == kRecorded) {
     recorder = RunRecorder::Create(folder);
     if (!recorder.ok()) return recorder.status();
   }
   std::vector<PosePair> pairs;
   for (std::size_t i = 0; i < world.frames.size(); ++i) {
     CostMeter meter;
-    const absl::StatusOr<PointsStep> step = filter.Step(i);
+    const absl::StatusOr<PointsStep> step = tracker->Step(world.frames[i]);
     const FrameCost cost = meter.Read();
     ++variant.frames;
     if (!step.ok()) {
@@ -87,7 +93,7 @@ absl::Status RunVariant(const PointsWorld& world, const PointsOptions& options,
       break;
     }
     variant.consistency.Add(i, step->nees, step->nis, step->matches);
-    const Rigid3& estimate = filter.filter().camera().world_from_camera;
+    const Rigid3& estimate = tracker->tracker().filter().camera().world_from_camera;
     const Rigid3& truth = world.frames[i].world_from_camera;
     pairs.push_back(
         {static_cast<Timestamp>(1e9 * world.dt_s * static_cast<double>(i)), estimate, truth});
@@ -96,7 +102,7 @@ absl::Status RunVariant(const PointsWorld& world, const PointsOptions& options,
                                      step->nis, step->matches, step->position_error_m,
                                      step->rotation_error_rad * 180 / std::numbers::pi));
     if (!recorder.ok()) continue;
-    const absl::Status recorded = Record(filter, *step, i, world.dt_s, cost, *recorder);
+    const absl::Status recorded = Record(*tracker, *step, i, world.dt_s, cost, *recorder);
     if (!recorded.ok()) return recorded;
   }
   const absl::StatusOr<TrajectoryScore> score = Score(pairs, Alignment::kSe3);
@@ -104,7 +110,7 @@ absl::Status RunVariant(const PointsWorld& world, const PointsOptions& options,
     variant.ates_m.Add(score->ate_se3_m);
     variant.rotations_deg.Add(score->rotation_se3_deg);
   }
-  variant.features.Add(static_cast<double>(filter.filter().feature_count()));
+  variant.features.Add(static_cast<double>(tracker->tracker().filter().feature_count()));
   return recorder.ok() ? recorder->Close() : absl::OkStatus();
 }
 
@@ -143,9 +149,9 @@ absl::StatusOr<Json> RunPointsScenario(const SimArguments& arguments) {
   PointsOptions options;
   options.duration_s = arguments.duration_s;
   const auto steps = static_cast<std::size_t>(std::lround(options.duration_s * options.fps));
-  std::vector<Variant> variants = {{PointsMode::kKnownMap, "known_map", steps},
-                                   {PointsMode::kSlamFej, "slam_fej", steps},
-                                   {PointsMode::kSlam, "slam_none", steps}};
+  std::vector<Variant> variants = {
+      {"known_map", steps}, {"slam_fej", steps}, {"slam", steps}, {kRecorded, steps}};
+  variants[0].known_map = variants[1].fej = variants[3].adjust = true;
   Timestamp told = MonotonicNow();
   for (int run = 0; run < arguments.runs; ++run) {
     options.seed = arguments.seed + static_cast<std::uint64_t>(run);
@@ -177,8 +183,8 @@ absl::StatusOr<Json> RunPointsScenario(const SimArguments& arguments) {
   report["points"] = options.points;
   report["noise_px"] = options.noise_px;
   // The fields that every scenario has speak of the recorded variant.
-  report["frames"] = variants[1].frames;
-  report["lost_frames"] = variants[1].lost_frames;
+  report["frames"] = variants[3].frames;
+  report["lost_frames"] = variants[3].lost_frames;
   for (const Variant& each : variants) report[each.name] = VariantReport(each);
   return report;
 }

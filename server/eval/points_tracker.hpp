@@ -2,64 +2,64 @@
 
 #include <absl/status/statusor.h>
 
-#include <map>
-#include <random>
-#include <vector>
+#include <memory>
 
+#include "server/eval/points_front_end.hpp"
 #include "server/eval/points_world.hpp"
-#include "server/filter/filter_state.hpp"
-#include "server/filter/robust_pose.hpp"
-#include "server/map/landmark.hpp"
+#include "server/tracker/tracker.hpp"
 
 namespace saccade {
 
 /// What one frame came to, against the truth.
-struct PointsTrackStep {
+struct PointsStep {
+  double nees = 0;           // of the 6-D pose
+  double position_nees = 0;  // of its 3-D position
+  double nis = 0;  // of all matches together: chi-square with 2 * matches degrees of freedom
+  int matches = 0;
   double position_error_m = 0;
   double rotation_error_rad = 0;
-  int attempted = 0, accepted = 0;
 };
 
-/// The tracker's way with its map at feature level, for runs of any length: search ellipses, robust
-/// pose and soft gate, the real filter, the map's own books and rules for retirement (T16, T41,
-/// T45). In place of pictures there are PointsWalk's observations.
+/// How a points run is tracked.
+struct PointsSetup {
+  TrackerOptions tracker;
+  bool known_map = false;  // every point is given, as those of a target: localisation only (T39)
+};
+
+/// The product's settings, less what a points world does not have: its noise is the same all over
+/// the picture, its shutter is global, and it has fewer points than a picture has corners.
+PointsSetup MakePointsSetup(const PointsOptions& options);
+/// The same for NEES and NIS: errors are counted from the start, where the truth is; no match is
+/// weighted, so that NIS is an honest chi-square (cut at the gate); and nothing is adjusted, which
+/// moves estimates but not their covariance.
+PointsSetup MakeConsistencySetup(const PointsOptions& options);
+
+/// The tracker on a points world: search, robust pose, filter, map, and all rules are the
+/// product's; only pictures are missing, and with them recognition: what is lost stays so.
 class PointsTracker {
  public:
-  /// `first`: the camera starts near it, off by what its covariance says.
-  PointsTracker(const PointsWorld& world, const PointsOptions& options, const PointsFrame& first);
+  /// `first`: the camera starts near it, off by what its covariance says, so that a consistent
+  /// filter is consistent from the first frame on. `world`, `options`: kept by the caller.
+  /// InvalidArgument: as Tracker::Create.
+  static absl::StatusOr<PointsTracker> Create(const PointsWorld& world,
+                                              const PointsOptions& options,
+                                              const PointsSetup& setup, const PointsFrame& first);
 
-  /// Frames in order. An error is the filter's own.
-  absl::StatusOr<PointsTrackStep> Step(const PointsFrame& frame);
+  /// Frames in order; `frame` is kept by the caller until the next. An error is the filter's own: a
+  /// covariance that broke.
+  absl::StatusOr<PointsStep> Step(const PointsFrame& frame);
 
-  const FilterState& filter() const { return filter_; }
-  /// Frames since a feature on this point was born; nothing if none lives.
-  std::optional<int> AgeOf(int point) const;
+  const Tracker& tracker() const { return *tracker_; }
 
  private:
-  /// A feature that the prediction puts in view, and what is found there.
-  struct Match {
-    FeatureId id = 0;
-    PoseEvidence evidence;
-    bool known = false, found = false, accepted = false;
-  };
-  std::vector<Match> Search(const PointsFrame& frame) const;
-  absl::Status Correct(std::vector<Match>& matches);
-  void Retire(const std::vector<Match>& matches);
-  absl::Status Birth(const PointsFrame& frame, int accepted);
-  double MedianInverseRange(const std::vector<Match>& matches) const;
+  PointsTracker(const PointsWorld& world, std::unique_ptr<Tracker> tracker,
+                PointsFrontEnd& front_end, const SourceInfo& source);
 
-  const PointsWorld& world_;
-  const PointsOptions options_;
-  FilterState filter_;
-  LandmarkMap map_;
-  std::mt19937_64 random_;
-  std::map<FeatureId, int> point_of_;       // of every living feature
-  std::map<int, FeatureId> feature_on_;     // the same the other way round
-  std::map<FeatureId, std::int64_t> born_;  // frame
-  double inverse_range_ = 0.5;              // guess for new features [1/m]
-  std::int64_t frame_ = -1;
-  std::int64_t last_birth_ = -1000;
-  bool followed_ = false;  // the frame before had matches
+  const PointsWorld* world_;
+  PointsFrontEnd* front_end_;  // the tracker's
+  std::unique_ptr<Tracker> tracker_;
+  Frame frame_;
+  std::int64_t steps_ = 0;
 };
 
 }  // namespace saccade

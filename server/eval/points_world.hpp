@@ -25,14 +25,6 @@ struct PointsOptions {
   int target_points = 6;
   /// Share of the matches that are false: anywhere within their search ellipse of 3 sigma.
   double false_matches = 0.0;
-  /// Matches are weighted by the robust pose, as the tracker does. Off: NIS is an honest
-  /// chi-square.
-  bool soft_gate = false;
-  /// Features by inverse range alone, bearings frozen at birth (ESID).
-  bool range_only = false;
-  /// Weight of the target's points where the robust pose refuses most of them at once; 0: as the
-  /// tracker, which leaves them out.
-  double least_target_weight = 0.0;
   /// The last of the points stand together on something that starts to move about at this time
   /// [s]: somebody in the room (T16).
   int moving_points = 0;

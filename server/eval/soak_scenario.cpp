@@ -8,10 +8,9 @@
 #include <cmath>
 #include <fstream>
 #include <iostream>
-#include <set>
+#include <map>
 
 #include "server/eval/output_file.hpp"
-#include "server/eval/points_tracker.hpp"
 #include "server/eval/registration.hpp"
 #include "server/eval/statistics.hpp"
 #include "shared/time/timestamp.hpp"
@@ -48,14 +47,10 @@ class MovingBook {
 
   void Look(const PointsTracker& tracker, double time_s, SoakResult& result) {
     if (time_s < options_.moving_from_s) return;
-    for (int point = options_.points - options_.moving_points; point < options_.points; ++point) {
-      const std::optional<int> age = tracker.AgeOf(point);
-      const auto at = since_.find(point);
-      if (!age || (at != since_.end() && *age == 0)) {
-        if (at != since_.end()) since_.erase(at);
-        if (!age) continue;
-      }
-      const auto [entry, fresh] = since_.try_emplace(point, time_s);
+    for (const Landmark& landmark : tracker.tracker().map().in_use().all()) {
+      const int point = PointsFrontEnd::PointOf(landmark.patch);
+      if (point < options_.points - options_.moving_points) continue;
+      const auto [entry, fresh] = since_.try_emplace(landmark.id, time_s);
       result.moving_features += fresh ? 1 : 0;
       const double stay_s = time_s - entry->second;
       if (stay_s > kPatience_s && stay_s <= kPatience_s + 1.0 / options_.fps) {
@@ -67,12 +62,12 @@ class MovingBook {
 
  private:
   const PointsOptions& options_;
-  std::map<int, double> since_;  // by point: when its present feature began to be wrong
+  std::map<FeatureId, double> since_;  // when it began to be wrong
 };
 
 }  // namespace
 
-absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options) {
+absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options, const PointsSetup& setup) {
   PointsWalk walk(options);
   const auto frames = static_cast<std::int64_t>(std::lround(options.duration_s * options.fps));
   const auto check_every = static_cast<std::int64_t>(std::lround(kCheckEvery_s * options.fps));
@@ -80,11 +75,12 @@ absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options) {
   MovingBook moving(options);
   Sample early, late;
   const PointsFrame& first = walk.Next();
-  PointsTracker tracker(walk.world(), options, first);
+  auto tracker = PointsTracker::Create(walk.world(), options, setup, first);
+  if (!tracker.ok()) return tracker.status();
   for (std::int64_t i = 0; i < frames; ++i) {
     const double time_s = static_cast<double>(i) / options.fps;
     const PointsFrame& frame = i == 0 ? first : walk.Next();
-    const auto step = tracker.Step(frame);
+    const auto step = tracker->Step(frame);
     if (!step.ok()) {
       return absl::Status(
           step.status().code(),
@@ -97,13 +93,13 @@ absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options) {
     const bool lost =
         step->position_error_m > kLostPosition_m || step->rotation_error_rad > kLostRotation_rad;
     if (lost && result.lost_at_s < 0) result.lost_at_s = time_s;
-    result.most_features = std::max(result.most_features, tracker.filter().feature_count());
-    result.most_states =
-        std::max(result.most_states, static_cast<std::size_t>(tracker.filter().dim()));
-    moving.Look(tracker, time_s, result);
+    const FilterState& filter = tracker->tracker().filter();
+    result.most_features = std::max(result.most_features, filter.feature_count());
+    result.most_states = std::max(result.most_states, static_cast<std::size_t>(filter.dim()));
+    moving.Look(*tracker, time_s, result);
     if (i == frames / 10) result.memory_early_mb = ResidentMb();
     if (i % check_every != check_every - 1 && i != frames - 1) continue;
-    const absl::StatusOr<double> least = LeastEigenvalue(tracker.filter());
+    const absl::StatusOr<double> least = LeastEigenvalue(filter);
     if (!least.ok()) return least.status();
     result.least_eigenvalue_over_trace = std::min(result.least_eigenvalue_over_trace, *least);
   }
@@ -126,7 +122,7 @@ absl::StatusOr<Json> RunSoakScenario(const SimArguments& arguments) {
   for (int run = 0; run < arguments.runs; ++run) {
     options.seed = arguments.seed + static_cast<std::uint64_t>(run);
     const Timestamp begin = MonotonicNow();
-    const absl::StatusOr<SoakResult> result = RunSoak(options);
+    const absl::StatusOr<SoakResult> result = RunSoak(options, MakePointsSetup(options));
     if (!result.ok()) {
       std::cerr << result.status().message() << "\n";
       ++failed;

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/eval/commands.hpp"
-#include "server/eval/points_world.hpp"
+#include "server/eval/points_tracker.hpp"
 
 namespace saccade {
 
@@ -26,7 +26,7 @@ struct SoakResult {
 };
 
 /// One run of PointsTracker over options.duration_s. An error is the filter's own, with the time.
-absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options);
+absl::StatusOr<SoakResult> RunSoak(const PointsOptions& options, const PointsSetup& setup);
 
 /// `soak` (T41, T45) and `passerby` (T16) at feature level: runs of any length with the tracker's
 /// rules for its map. In `passerby` somebody who stood before the wearer walks to and fro from 20 s

@@ -11,7 +11,7 @@ using Eigen::VectorXd;
 
 constexpr int kCamera = 12;
 constexpr double kRangeSigma = 0.1;    // of the range
-constexpr std::size_t kMeasured = 25;  // as PointsFilter
+constexpr std::size_t kMeasured = 25;  // a frame, as in a real run of modest cost
 constexpr std::size_t kMaxFeatures = 120;
 constexpr std::size_t kBirths = 15;
 constexpr std::size_t kEnough = 20;

@@ -5,7 +5,7 @@
 #include <map>
 #include <random>
 
-#include "server/eval/points_filter.hpp"
+#include "server/eval/points_tracker.hpp"
 #include "server/eval/points_world.hpp"
 
 namespace saccade {

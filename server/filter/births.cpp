@@ -74,6 +74,15 @@ absl::Status FilterState::AddFeature(CloneId clone, const FeatureBirth& birth) {
   return absl::OkStatus();
 }
 
+void FilterState::TellRange(FeatureId id, double inverse_range, double sigma) {
+  Feature& feature = *std::ranges::lower_bound(features_, id, {}, &Feature::id);
+  feature.point.inverse_range = feature.first.inverse_range = inverse_range;
+  const int at = At(feature.block) + form_->range();
+  Island& island = IslandAt(IslandOf(feature.block));
+  island.p.ReplaceBlock(at, Eigen::Matrix<double, 1, 1>(sigma * sigma));
+  if (island.checkpoint) island.checkpoint->journal.Add(Journal::Told{at});
+}
+
 void FilterState::Remove(std::span<const FeatureId> ids) {
   std::vector<BlockId> gone;
   for (const FeatureId id : ids) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/filter/covariance.hpp"
+#include "server/filter/depth_particles.hpp"
 #include "server/filter/filter_types.hpp"
 #include "server/filter/journal.hpp"
 #include "server/filter/parallax.hpp"
@@ -95,6 +96,12 @@ class FilterState {
                    RobotId robot = kFirstRobot);
   /// Starts a feature in a clone. InvalidArgument: unknown clone, id taken, numbers not usable.
   absl::Status AddFeature(CloneId clone, const FeatureBirth& birth);
+  /// What is known of where a feature can be, whatever its range; nothing if it is not there. For a
+  /// range that is sought outside the filter (depth_particles): until TellRange() it should see no
+  /// update, so that the range knows nothing of the rest.
+  std::optional<DepthLine> LineOf(FeatureId id, RobotId robot = kFirstRobot) const;
+  /// Its range as found elsewhere [1/m], in place of what the filter knew of it. `id` must exist.
+  void TellRange(FeatureId id, double inverse_range, double sigma);
   /// Removes features (unknown ids are ignored), and the clones that then carry none.
   void Remove(std::span<const FeatureId> ids);
 

@@ -49,6 +49,11 @@ VectorXd Apply(const Journal::Appended& appended, VectorXd step) {
   return Extended(step, appended.size);
 }
 
+VectorXd Apply(const Journal::Told& told, VectorXd step) {
+  step[told.offset] = 0.0;
+  return step;
+}
+
 VectorXd Apply(const Journal::Kept& kept, VectorXd step) {
   VectorXd shorter(static_cast<Eigen::Index>(kept.rows.size()));
   for (std::size_t k = 0; k < kept.rows.size(); ++k) {

@@ -43,10 +43,13 @@ class Journal {
   struct Appended {
     int size = 0;  // numbers that know nothing of the rest
   };
+  struct Told {
+    int offset = 0;  // of a number that was replaced by what is known from elsewhere
+  };
   struct Kept {
     std::vector<int> rows;  // that stayed, rising
   };
-  using Entry = std::variant<Updated, Predicted, Cloned, Appended, Kept>;
+  using Entry = std::variant<Updated, Predicted, Cloned, Appended, Told, Kept>;
 
   void Add(Entry entry) { entries_.push_back(std::move(entry)); }
   std::size_t size() const { return entries_.size(); }

@@ -89,6 +89,19 @@ std::optional<PredictedPixel> FilterState::Predicted(const CameraModel& camera,
   return PredictedPixel{*at, hp * at->d_camera.transpose(), hp};
 }
 
+std::optional<DepthLine> FilterState::LineOf(FeatureId id, RobotId robot) const {
+  const Feature* feature = Find(id);
+  if (feature == nullptr) return std::nullopt;
+  DepthLine line;
+  line.line = Point(*feature, /*first=*/false);
+  line.world_from_camera = Of(robot).motion.world_from_camera;
+  const SmallMatrix p = Gather(Of(robot), CloneOf(*feature), *feature);
+  const int known = std::min<int>(kPoses + form_->range(), line.covariance.rows());
+  line.covariance.topLeftCorner(known, known) = p.topLeftCorner(known, known);
+  line.covariance.bottomRightCorner<2, 2>() += form_->Frozen(feature->birth_covariance);
+  return line;
+}
+
 FeatureMarginal FilterState::Marginal(FeatureId id, RobotId robot) const {
   FeatureMarginal marginal;
   const Feature* feature = Find(id);

@@ -23,6 +23,7 @@ struct Landmark {
   };
   std::optional<Known> known;
   bool seeded = false;  // started at a click: something may hang on it
+  bool waits = false;   // for its range, until when it is not searched for (`classic` start)
 
   std::uint32_t attempted = 0;      // frames in which it was searched for
   std::uint32_t matched = 0;        // of these, accepted by the filter

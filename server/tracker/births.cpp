@@ -10,21 +10,11 @@
 namespace saccade {
 namespace {
 
-CornerOptions MakeCornerOptions(const TrackerOptions& options) {
-  CornerOptions corner;
-  corner.min_score = options.corner_min_score;
-  corner.border_px = 16;
-  return corner;
-}
-
 constexpr int kDepthFeatures = 8;          // needed to guess the depth of a new one
 constexpr int kFramesBetweenGrowth = 5;    // unless the view is nearly empty
 constexpr double kBetweenGrowth_s = 0.16;  // where frames take longer
 
 }  // namespace
-
-Births::Births(const TrackerOptions& options)
-    : options_(options), detector_(MakeCornerOptions(options)) {}
 
 void Births::Reset() { frames_since_growth_ = 1000; }
 
@@ -55,7 +45,7 @@ std::optional<Births::DepthGuess> Births::GuessDepth(const FilterState& filter,
 int Births::Missing(const FrameMatches& matches) const {
   int usable = 0;
   for (const LandmarkMatch& match : matches.in_view) {
-    usable += match.searched || match.weight > 0 ? 1 : 0;
+    usable += match.searched || match.waits || match.weight > 0 ? 1 : 0;
   }
   return options_.features_in_view - usable;
 }
@@ -69,26 +59,14 @@ bool Births::Wants(const FrameMatches& matches) const {
   return missing >= options_.features_in_view / 8 && due;
 }
 
-std::optional<Eigen::Vector2d> Births::CornerNear(const ImagePyramid& pyramid,
-                                                  const Eigen::Vector2d& pixel, int radius_px) {
-  const cv::Rect region(static_cast<int>(std::lround(pixel.x())) - radius_px,
-                        static_cast<int>(std::lround(pixel.y())) - radius_px, 2 * radius_px + 1,
-                        2 * radius_px + 1);
-  detector_.Detect(pyramid, region, {}, 1, corners_);
-  if (corners_.empty()) return std::nullopt;
-  return corners_.front().pixel;
-}
-
 std::optional<FeatureId> Births::Plant(const Frame& frame, const Eigen::Vector2d& pixel,
                                        const DepthGuess& depth, CloneId clone,
                                        const CameraMotion& motion, const FrameMatcher& matcher,
-                                       FilterState& filter, LandmarkMap& map) {
-  auto patch = CutPatch(frame.grey, pixel, frame.camera);
+                                       FrontEnd& front_end, FilterState& filter, LandmarkMap& map) {
+  auto patch = front_end.Cut(pixel);
   Eigen::Matrix<double, 3, 2> d_bearing;
   const auto bearing = frame.camera->Unproject(pixel, &d_bearing);
-  if (!patch.ok() || !bearing) return std::nullopt;
-  WarpedPatch look;
-  if (CopyPatch(*patch, WarpOptions(), look) != WarpStatus::kOk) return std::nullopt;
+  if (!patch || !bearing) return std::nullopt;
   const double sigma = matcher.PixelSigma(*frame.camera, pixel);
   FeatureBirth birth;
   birth.id = map.NextId();
@@ -110,8 +88,8 @@ std::optional<FeatureId> Births::Plant(const Frame& frame, const Eigen::Vector2d
   return birth.id;
 }
 
-int Births::Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
-                 const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
+int Births::Grow(const Frame& frame, const FrameMatches& matches, const DepthGuess& depth,
+                 bool everywhere, const FrameMatcher& matcher, FrontEnd& front_end,
                  FilterState& filter, LandmarkMap& map, std::mt19937_64& random) {
   ++frames_since_growth_;
   now_ns_ = frame.capture_time_ns;
@@ -119,21 +97,22 @@ int Births::Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMat
   std::vector<Eigen::Vector2d> occupied;
   for (const LandmarkMatch& match : matches.in_view) occupied.push_back(match.pixel);
   const int wanted = everywhere ? options_.features_in_view : options_.births_per_clone;
-  detector_.DetectAll(pyramid, occupied, 3 * wanted, corners_);
-  if (corners_.empty()) return 0;
+  std::vector<Eigen::Vector2d> corners = front_end.Corners(occupied, 3 * wanted);
+  if (corners.empty()) return 0;
   frames_since_growth_ = 0;
   grown_ns_ = now_ns_;
   // The best third for sure, the rest by chance among what is left: strong corners come in heaps.
-  const int fixed = std::min<int>(wanted / 3, static_cast<int>(corners_.size()));
-  for (std::size_t k = corners_.size(); k > static_cast<std::size_t>(fixed) + 1; --k) {
-    std::swap(corners_[k - 1], corners_[fixed + random() % (k - fixed)]);
+  const int fixed = std::min<int>(wanted / 3, static_cast<int>(corners.size()));
+  for (std::size_t k = corners.size(); k > static_cast<std::size_t>(fixed) + 1; --k) {
+    std::swap(corners[k - 1], corners[fixed + random() % (k - fixed)]);
   }
   const NewClone clone(filter);
   int planted = 0;
-  for (const Corner& corner : corners_) {
+  for (const Eigen::Vector2d& corner : corners) {
     if (planted >= wanted) break;
-    planted +=
-        Plant(frame, corner.pixel, depth, clone.id(), matches.motion, matcher, filter, map) ? 1 : 0;
+    const auto born =
+        Plant(frame, corner, depth, clone.id(), matches.motion, matcher, front_end, filter, map);
+    planted += born ? 1 : 0;
   }
   return planted;
 }

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "server/capture/frame.hpp"
-#include "server/features/corner_detector.hpp"
 #include "server/filter/filter_state.hpp"
 #include "server/map/landmark.hpp"
 #include "server/tracker/frame_matcher.hpp"
@@ -16,7 +15,7 @@ namespace saccade {
 /// Starts features where they are needed (slam-spec 5.6, docs/derivations/birth.md).
 class Births {
  public:
-  explicit Births(const TrackerOptions& options);
+  explicit Births(const TrackerOptions& options) : options_(options) {}
   void Reset();
 
   /// What features near the camera are taken to be at, before anything is known of them.
@@ -32,25 +31,20 @@ class Births {
   int Missing(const FrameMatches& matches) const;
   /// Starts features in a new pose clone, where the picture has corners and the map has none.
   /// `everywhere`: as many as the map wants in view (the first frame). Returns how many.
-  int Grow(const Frame& frame, const ImagePyramid& pyramid, const FrameMatches& matches,
-           const DepthGuess& depth, bool everywhere, const FrameMatcher& matcher,
-           FilterState& filter, LandmarkMap& map, std::mt19937_64& random);
-  /// The best corner at most `radius_px` from `pixel`, if there is one: what can be tracked.
-  std::optional<Eigen::Vector2d> CornerNear(const ImagePyramid& pyramid,
-                                            const Eigen::Vector2d& pixel, int radius_px);
+  int Grow(const Frame& frame, const FrameMatches& matches, const DepthGuess& depth,
+           bool everywhere, const FrameMatcher& matcher, FrontEnd& front_end, FilterState& filter,
+           LandmarkMap& map, std::mt19937_64& random);
   /// Starts one feature at a pixel, seen by a camera of these velocities; nothing if there is no
   /// texture or no room for a patch.
   std::optional<FeatureId> Plant(const Frame& frame, const Eigen::Vector2d& pixel,
                                  const DepthGuess& depth, CloneId clone, const CameraMotion& motion,
-                                 const FrameMatcher& matcher, FilterState& filter,
-                                 LandmarkMap& map);
+                                 const FrameMatcher& matcher, FrontEnd& front_end,
+                                 FilterState& filter, LandmarkMap& map);
   /// True if Grow() would start features now.
   bool Wants(const FrameMatches& matches) const;
 
  private:
   TrackerOptions options_;
-  CornerDetector detector_;
-  std::vector<Corner> corners_;
   int frames_since_growth_ = 1000;
   Timestamp grown_ns_ = 0, now_ns_ = 0;  // the newest growth, and the newest frame
 };

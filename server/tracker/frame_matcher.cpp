@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <span>
 
 #include "server/tracker/group_consistency.hpp"
@@ -13,21 +12,8 @@ namespace saccade {
 namespace {
 
 constexpr double kBorder_px = 6.0;       // half a patch: nearer to the edge nothing can be compared
-constexpr double kWidest_px = 30.0;      // sigma of the widest ellipse that is searched
 constexpr int kFewestForMotion = 6;      // matches: fewer may agree on any
 constexpr double kUncertain_rad = 0.03;  // of the camera's direction, before a frame is searched
-
-SearchOptions MakeSearchOptions(const TrackerOptions& options) {
-  SearchOptions search;
-  search.max_nssd = options.max_nssd;
-  search.gate_squared = options.gate_sigma * options.gate_sigma;
-  search.max_sigma_px = kWidest_px;
-  // Lucas-Kanade runs astray on blurred patches: fr1/xyz 0.8 cm with parabolas, up to 17 with it.
-  search.sub_pixel = options.sub_pixel == 0   ? SubPixel::kNone
-                     : options.sub_pixel == 1 ? SubPixel::kParabola
-                                              : SubPixel::kLucasKanade;
-  return search;
-}
 
 /// Pose, direction and inverse range from where the landmark's patch was seen.
 PointFromClone FromBirth(const Landmark& landmark,
@@ -105,37 +91,7 @@ void BookRow(const CameraModel& camera, const CameraMotion& motion, double reado
   match.row_shift = match.d_readout * readout_s;
 }
 
-/// Of the ellipse that PatchSearcher looks at [px^2].
-double SearchedArea(const SearchOptions& options, const Eigen::Matrix2d& covariance) {
-  const Eigen::Array2d half_axes =
-      (options.gate_squared *
-       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues().array().max(0.0))
-          .sqrt()
-          .max(options.min_half_axis_px);
-  return std::numbers::pi * half_axes.prod();
-}
-
-/// Whether the picture has no texture around a pixel: a covered lens, a hand before it, a blank
-/// wall.
-bool IsBlank(const cv::Mat& grey, const Eigen::Vector2d& pixel) {
-  constexpr int kRadius_px = 12;
-  constexpr double kTexture = 6.0;  // grey levels; a patch has at least 10
-  const cv::Rect window(static_cast<int>(pixel.x()) - kRadius_px,
-                        static_cast<int>(pixel.y()) - kRadius_px, 2 * kRadius_px + 1,
-                        2 * kRadius_px + 1);
-  const cv::Rect inside = window & cv::Rect({0, 0}, grey.size());
-  if (inside.empty()) return true;
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(grey(inside), mean, deviation);
-  return deviation[0] < kTexture;
-}
-
 }  // namespace
-
-FrameMatcher::FrameMatcher(const TrackerOptions& options)
-    : options_(options), searcher_(MakeSearchOptions(options)) {
-  warp_.size = options.patch_px;
-}
 
 double FrameMatcher::PixelSigma(const CameraModel& camera, const Eigen::Vector2d& pixel) const {
   const CameraIntrinsics& lens = camera.intrinsics();
@@ -156,6 +112,7 @@ std::vector<LandmarkMatch> FrameMatcher::Visible(const CameraModel& camera,
     if (!predicted || !camera.InImage(predicted->at.pixel, kBorder_px)) continue;
     LandmarkMatch match;
     match.id = landmark.id;
+    match.waits = landmark.waits;
     match.predicted = *predicted;
     if (landmark.known) {
       match.point = landmark.known->point_in_world;
@@ -178,6 +135,7 @@ std::vector<int> FrameMatcher::Order(const CameraModel& camera,
   };
   std::array<std::vector<Entry>, kColumns * kRows> cells;
   for (std::size_t k = 0; k < in_view.size(); ++k) {
+    if (in_view[k].waits) continue;
     const Landmark& landmark = *map.Find(in_view[k].id);
     // Old and reliable first; a little chance, so that equals take turns.
     const double age = std::min<double>(landmark.matched, 100.0);
@@ -206,10 +164,10 @@ std::vector<int> FrameMatcher::Order(const CameraModel& camera,
   return order;
 }
 
-void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera,
-                          const LandmarkMap& map, const PosePrior& prior, const Rigid3& pose,
+void FrameMatcher::Search(FrontEnd& front_end, const CameraModel& camera, const LandmarkMap& map,
+                          const PosePrior& prior, const Rigid3& pose,
                           const Matrix6d& pose_covariance, const CameraMotion& motion,
-                          double readout_s, LandmarkMatch& match) {
+                          double readout_s, LandmarkMatch& match) const {
   const Landmark& landmark = *map.Find(match.id);
   const Eigen::LLT<Matrix6d> factor(prior.covariance);
   const auto expected = PixelGivenPose(camera, prior, factor, match.point, match.predicted, pose);
@@ -218,33 +176,20 @@ void FrameMatcher::Search(const ImagePyramid& pyramid, const CameraModel& camera
   if (!expected || !camera.InImage(expected->pixel, kBorder_px)) return;
   BookRow(camera, motion, readout_s, expected->pixel, match);
   match.pixel = expected->pixel + match.row_shift;
-  const Eigen::Vector2d centre = match.pixel;
-  const PointFromClone birth = FromBirth(landmark, match.point);
-  const WarpStatus warped = options_.warp
-                                ? WarpPatch(landmark.patch, pose.Inverse() * birth.world_from_clone,
-                                            birth.bearing, std::max(0.0, birth.inverse_range),
-                                            Eigen::Vector3d::Zero(), camera, centre, warp_, warped_)
-                                : CopyPatch(landmark.patch, warp_, warped_);
-  if (warped != WarpStatus::kOk) return;  // not seen from here: no attempt
   const double sigma = PixelSigma(camera, expected->pixel);
   const Eigen::Matrix2d spread = expected->d_pose * pose_covariance * expected->d_pose.transpose() +
                                  expected->covariance + sigma * sigma * Eigen::Matrix2d::Identity();
-  // After blind frames the ellipse outgrows what can be searched: look in its middle then.
-  const double shrink = std::min(1.0, kWidest_px * kWidest_px / std::max(1e-9, spread.trace()));
-  const SearchResult result = searcher_.Find(pyramid, warped_, centre, shrink * spread);
-  if (result.status == SearchStatus::kTooUncertain || result.status == SearchStatus::kOutside ||
-      result.status == SearchStatus::kBadInput) {
-    return;
-  }
-  match.searched_px2 += SearchedArea(searcher_.options(), shrink * spread);
-  match.found = result.found();
-  // Where there is nothing at all, something hides the feature: no attempt (slam-spec 5.6).
-  match.hidden = !match.found && IsBlank(pyramid.level(0), centre);
+  const LandmarkSighting sighting =
+      front_end.Find({&landmark, FromBirth(landmark, match.point), pose, match.pixel, spread});
+  if (sighting.kind == LandmarkSighting::Kind::kNotSought) return;
+  match.searched_px2 += sighting.searched_px2;
+  match.found = sighting.kind == LandmarkSighting::Kind::kFound;
+  match.hidden = sighting.kind == LandmarkSighting::Kind::kHidden;
   match.searched = !match.hidden;
   if (!match.found) return;
-  match.pixel = result.pixel;
-  BookRow(camera, motion, readout_s, result.pixel, match);
-  match.noise = sigma * sigma * Eigen::Matrix2d::Identity() + result.covariance;
+  match.pixel = sighting.pixel;
+  BookRow(camera, motion, readout_s, sighting.pixel, match);
+  match.noise = sigma * sigma * Eigen::Matrix2d::Identity() + sighting.covariance;
 }
 
 RobustPose FrameMatcher::Solve(const CameraModel& camera, const PosePrior& prior,
@@ -296,9 +241,9 @@ void FrameMatcher::CatchUp(const CameraModel& camera, const FilterState& filter,
   }
 }
 
-FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel& camera,
+FrameMatches FrameMatcher::Match(FrontEnd& front_end, const CameraModel& camera,
                                  const FilterState& filter, const LandmarkMap& map,
-                                 const MotionStep& step, std::mt19937_64& random) {
+                                 const MotionStep& step, std::mt19937_64& random) const {
   FrameMatches matches;
   const PosePrior prior{filter.camera().world_from_camera, filter.PoseCovariance()};
   matches.motion = filter.WholeMotion();
@@ -309,7 +254,7 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
   const int first = std::min(options_.first_stage, total);
   int searched = 0;
   for (int k = 0; k < first; ++k) {
-    Search(pyramid, camera, map, prior, prior.world_from_camera, prior.covariance, matches.motion,
+    Search(front_end, camera, map, prior, prior.world_from_camera, prior.covariance, matches.motion,
            filter.readout_s(), in_view[order[k]]);
     searched += in_view[order[k]].searched ? 1 : 0;
   }
@@ -324,7 +269,7 @@ FrameMatches FrameMatcher::Match(const ImagePyramid& pyramid, const CameraModel&
   for (int k = 0; k < total; ++k) {
     LandmarkMatch& match = in_view[order[k]];
     if (match.accepted() || (match.searched && !known)) continue;
-    Search(pyramid, camera, map, prior, pose, spread, matches.motion, filter.readout_s(), match);
+    Search(front_end, camera, map, prior, pose, spread, matches.motion, filter.readout_s(), match);
   }
   matches.pose = Solve(camera, prior, in_view, random);
   CatchUp(camera, filter, step, matches);

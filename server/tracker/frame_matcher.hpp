@@ -3,10 +3,10 @@
 #include <random>
 #include <vector>
 
-#include "server/features/search.hpp"
 #include "server/filter/filter_state.hpp"
 #include "server/filter/robust_pose.hpp"
 #include "server/map/landmark.hpp"
+#include "server/tracker/front_end.hpp"
 #include "server/tracker/present_motion.hpp"
 #include "server/tracker/tracker_options.hpp"
 
@@ -17,6 +17,7 @@ struct LandmarkMatch {
   FeatureId id = 0;
   PredictedPixel predicted;                             // at the predicted pose
   std::variant<PointFromClone, Eigen::Vector3d> point;  // as the filter has it; known points
+  bool waits = false;                                   // for its range: not searched for
   bool searched = false;
   bool found = false;
   bool hidden = false;  // nothing but blank where it should be: no attempt
@@ -42,16 +43,15 @@ struct FrameMatches {
   bool surprised = false;   // few of the first stage agree: the camera moved unexpectedly
 };
 
-/// Finds the map in a picture: a few features widely, a robust pose from them, the rest narrowly
+/// Finds the map in a frame: a few features widely, a robust pose from them, the rest narrowly
 /// around that, and the pose again (findings; slam-spec 5.1, 5.5).
 class FrameMatcher {
  public:
-  explicit FrameMatcher(const TrackerOptions& options);
+  explicit FrameMatcher(const TrackerOptions& options) : options_(options) {}
 
-  /// `filter` has predicted `step`; nothing but scratch memory changes.
-  FrameMatches Match(const ImagePyramid& pyramid, const CameraModel& camera,
-                     const FilterState& filter, const LandmarkMap& map, const MotionStep& step,
-                     std::mt19937_64& random);
+  /// `filter` has predicted `step`.
+  FrameMatches Match(FrontEnd& front_end, const CameraModel& camera, const FilterState& filter,
+                     const LandmarkMap& map, const MotionStep& step, std::mt19937_64& random) const;
 
   /// The same matches against a filter that has changed since; nothing is searched anew.
   void Renew(const CameraModel& camera, const FilterState& filter, FrameMatches& matches,
@@ -66,9 +66,9 @@ class FrameMatcher {
   /// Indices into `in_view`, most wanted first, spread over the picture.
   std::vector<int> Order(const CameraModel& camera, const std::vector<LandmarkMatch>& in_view,
                          const LandmarkMap& map, std::mt19937_64& random) const;
-  void Search(const ImagePyramid& pyramid, const CameraModel& camera, const LandmarkMap& map,
+  void Search(FrontEnd& front_end, const CameraModel& camera, const LandmarkMap& map,
               const PosePrior& prior, const Rigid3& pose, const Matrix6d& pose_covariance,
-              const CameraMotion& motion, double readout_s, LandmarkMatch& match);
+              const CameraMotion& motion, double readout_s, LandmarkMatch& match) const;
   /// The motion by the pose that was found, and with it where in mid-exposure the matches were.
   static void CatchUp(const CameraModel& camera, const FilterState& filter, const MotionStep& step,
                       FrameMatches& matches);
@@ -76,9 +76,6 @@ class FrameMatcher {
                    std::vector<LandmarkMatch>& in_view, std::mt19937_64& random) const;
 
   TrackerOptions options_;
-  PatchSearcher searcher_;
-  WarpOptions warp_;
-  WarpedPatch warped_;
 };
 
 }  // namespace saccade

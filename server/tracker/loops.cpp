@@ -24,7 +24,8 @@ OldLandmarks Tracker::OldOnes() const {
 }
 
 void Tracker::CloseLoops(const Frame& frame) {
-  if (!options_.loops || !options_.wake || !options_.adjust) return;
+  const ImagePyramid* pyramid = front_end_->pyramid();
+  if (!options_.loops || !options_.wake || !options_.adjust || pyramid == nullptr) return;
   const auto is_known = [](const LandmarkMatch& match) {
     return std::holds_alternative<Eigen::Vector3d>(match.point);
   };
@@ -38,7 +39,7 @@ void Tracker::CloseLoops(const Frame& frame) {
     if (known) rigid_from = std::min(rigid_from, known->anchor);
   }
   const auto correction =
-      loops_.Step({frames_, frame, pyramid_, filter_, matches_, map_.keyframes(), old, rigid_from});
+      loops_.Step({frames_, frame, *pyramid, filter_, matches_, map_.keyframes(), old, rigid_from});
   times_.waited_ms += loops_.waited_ms();
   if (correction) MoveMap(*correction);
 }

@@ -28,11 +28,11 @@ void Tracker::KeepKeyframe(const Frame& frame) {
   if (monitor_.status() != TrackingStatus::kTracking || loops_.ReadsRelocaliser()) return;
   const Rigid3& pose = filter_.camera().world_from_camera;
   const double distance = kKeyframeShare / std::max(1e-6, depth_.inverse_range);
-  if (!relocaliser_.NeedsKeyframe(pose, distance, kKeyframeAngle_rad)) {
+  if (!relocaliser_.NeedsView(pose, distance, kKeyframeAngle_rad)) {
     relocaliser_.Densify(*frame.camera, [this](FeatureId id) { return map_.Where(id, filter_); });
     return;
   }
-  std::vector<KeyframePoint> points;
+  std::vector<ViewPoint> points;
   for (const LandmarkMatch& match : matches_.in_view) {
     if (!match.accepted()) continue;
     const Landmark* landmark = map_.in_use().Find(match.id);
@@ -46,7 +46,7 @@ void Tracker::KeepKeyframe(const Frame& frame) {
     }
   }
   // Too few points is no error: a later frame from here may have more.
-  relocaliser_.AddKeyframe(frame.id, frame.grey, pose, points).IgnoreError();
+  relocaliser_.AddView(frame.id, frame.grey, pose, points).IgnoreError();
 }
 
 void Tracker::Recover(const Frame& frame) {
@@ -127,15 +127,7 @@ absl::StatusOr<FeatureId> Tracker::SeedFeature(const Frame& clicked_frame,
   if (!pixel.allFinite() || !clicked_frame.camera || !clicked_frame.camera->InImage(pixel)) {
     return absl::InvalidArgumentError("feature: the pixel is not in the picture");
   }
-  // An edge or a plain surface would slide and end at a depth of its own making.
-  constexpr int kCornerRadius_px = 4;  // inside the patch that is tracked
-  ImagePyramid clicked_pyramid;
-  if (const absl::Status built = clicked_pyramid.Build(clicked_frame.grey); !built.ok())
-    return built;
-  if (!births_.CornerNear(clicked_pyramid, pixel, kCornerRadius_px)) {
-    return absl::NotFoundError("feature: no corner to track at this pixel");
-  }
-  const auto patch = CutPatch(clicked_frame.grey, pixel, clicked_frame.camera);
+  const auto patch = front_end_->CutClicked(clicked_frame, pixel);
   if (!patch.ok()) return patch.status();
   const CameraModel& camera = *last_frame_.camera;
   const Rigid3& pose = filter_.camera().world_from_camera;
@@ -146,26 +138,19 @@ absl::StatusOr<FeatureId> Tracker::SeedFeature(const Frame& clicked_frame,
   if (!expected || !camera.InImage(expected->pixel, 12.0)) {
     return absl::NotFoundError("feature: what was clicked is not in view any more");
   }
-  WarpedPatch look;
-  if (WarpPatch(*patch, pose.Inverse() * world_from_camera, clicked.bearing, clicked.inverse_range,
-                Eigen::Vector3d::Zero(), camera, expected->pixel, WarpOptions(),
-                look) != WarpStatus::kOk) {
-    return absl::NotFoundError("feature: nothing to recognise at this pixel");
-  }
   const double inverse_sigma = depth_sigma_m / depth_prior_m / range;
   const Eigen::Vector2d along = expected->d_point.col(2) * inverse_sigma;
   const Eigen::Matrix2d spread = along * along.transpose() + 4.0 * Eigen::Matrix2d::Identity();
-  SearchOptions search;
-  search.max_sigma_px = 40.0;
-  const SearchResult seen = PatchSearcher(search).Find(pyramid_, look, expected->pixel, spread);
-  if (!seen.found()) return absl::NotFoundError("feature: not seen in the newest frame");
+  const auto seen =
+      front_end_->FindClicked(*patch, {nullptr, clicked, pose, expected->pixel, spread});
+  if (!seen.ok()) return seen.status();
   const double now = (pose.Inverse() * (world_from_camera * (clicked.bearing * range))).norm();
   const Births::DepthGuess depth{1.0 / now, depth_sigma_m / depth_prior_m / now};
   std::optional<FeatureId> id;
   {
     const NewClone clone(filter_);
-    id = births_.Plant(last_frame_, seen.pixel, depth, clone.id(), matches_.motion, matcher_,
-                       filter_, map_.in_use());
+    id = births_.Plant(last_frame_, *seen, depth, clone.id(), matches_.motion, matcher_,
+                       *front_end_, filter_, map_.in_use());
   }
   KeepForAdjustment(camera);
   if (!id) return absl::NotFoundError("feature: no texture to track at this pixel");

@@ -1,4 +1,5 @@
-// The part of the tracker that begins without a target (slam-spec 7).
+// The part of the tracker that begins: with a target, or without one (slam-spec 7).
+#include "server/pipeline/stop_watch.hpp"
 #include "server/tracker/tracker.hpp"
 
 namespace saccade {
@@ -14,6 +15,37 @@ constexpr double kAngularVelocitySigma_rad_s = 0.5;
 constexpr double kAgreeing = 0.75;
 
 }  // namespace
+
+void Tracker::Begin(const Frame& frame) {
+  StopWatch watch;
+  matches_ = FrameMatches();
+  const auto start = starter_.Try(*front_end_, filter_, map_.in_use());
+  times_.search_ms = watch.Lap_ms();
+  if (!start) {
+    monitor_.WaitForStart();
+    return;
+  }
+  metric_ = start->metric;
+  held_ = metric_ || !options_.start;
+  depth_ = start->depth;
+  matches_ =
+      matcher_.Match(*front_end_, *frame.camera, filter_, map_.in_use(), MotionStep(), random_);
+  Grow(frame, /*everywhere=*/true);
+  started_ = filter_.feature_count() > 0 || !map_.in_use().all().empty();
+  times_.manage_ms = watch.Lap_ms();
+  if (!started_) return;  // nothing to see at all: try again with the next frame
+  frames_ = 0;
+  // Features that are born in this frame are seen in it.
+  const int born = static_cast<int>(filter_.feature_count());
+  matches_.attempted += born;
+  matches_.accepted += born;
+  if (held_) {
+    KeepForAdjustment(*frame.camera);
+  } else {
+    finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
+  }
+  if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
+}
 
 void Tracker::SeekStart(const Frame& frame) {
   finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/features/target_detector.hpp"
-
 namespace saccade {
 namespace {
 
@@ -53,8 +51,6 @@ absl::Status Starter::Check(const SourceInfo& source) {
           absl::StrCat("source ", source.uri,
                        ": target.yaml of type patches needs at least 3 points and a start.yaml"));
     }
-    const auto templates = PatchTemplates(*patches, source.start->world_from_camera, source.camera);
-    return templates.status();
   }
   return absl::OkStatus();
 }
@@ -68,52 +64,51 @@ bool Starter::TargetExpired(std::int64_t frames_since_start) const {
          frames_since_start >= options_.target_frames;
 }
 
-std::optional<Start> Starter::Try(const Frame& frame, const ImagePyramid& pyramid,
-                                  FilterState& filter, LandmarkMap& map) {
+std::optional<Start> Starter::Try(FrontEnd& front_end, FilterState& filter, LandmarkMap& map) {
   if (!waits_for_target()) return Free(filter);
   ++waited_;
   return std::holds_alternative<ChessboardTarget>(*source_.target)
-             ? TryChessboard(frame, pyramid, filter, map)
-             : TryPatches(frame, pyramid, filter, map);
+             ? TryChessboard(front_end, filter, map)
+             : TryPatches(front_end, filter, map);
 }
 
-std::optional<Start> Starter::TryChessboard(const Frame& frame, const ImagePyramid& pyramid,
-                                            FilterState& filter, LandmarkMap& map) {
+std::optional<Start> Starter::TryChessboard(FrontEnd& front_end, FilterState& filter,
+                                            LandmarkMap& map) {
   const auto& target = std::get<ChessboardTarget>(*source_.target);
   std::optional<Rigid3> predicted;
   if (source_.start) predicted = source_.start->world_from_camera;
-  const auto seen = DetectChessboard(pyramid, *frame.camera, target, predicted);
+  const auto seen = front_end.FindChessboard(target, predicted);
   if (!seen.ok() || seen->ambiguous) return std::nullopt;
   CameraMotion camera;
   camera.world_from_camera = seen->world_from_camera;
   filter.Reset(camera, MotionCovariance(seen->pose_covariance, kVelocitySigma_m_s,
                                         kAngularVelocitySigma_rad_s));
   for (std::size_t k = 0; k < seen->pixels.size(); ++k) {
-    const auto patch = CutPatch(frame.grey, seen->pixels[k], frame.camera);
-    if (patch.ok()) AddKnown(*patch, seen->points_in_world[k], seen->world_from_camera, map);
+    const auto patch = front_end.Cut(seen->pixels[k]);
+    if (patch) AddKnown(*patch, seen->points_in_world[k], seen->world_from_camera, map);
   }
   return Start{true, AtMedianRange(seen->points_in_world, seen->world_from_camera)};
 }
 
-std::optional<Start> Starter::TryPatches(const Frame& frame, const ImagePyramid& pyramid,
-                                         FilterState& filter, LandmarkMap& map) {
+std::optional<Start> Starter::TryPatches(FrontEnd& front_end, FilterState& filter,
+                                         LandmarkMap& map) {
   const auto& target = std::get<PatchTarget>(*source_.target);
   const StartPose& start = *source_.start;
-  const auto seen = DetectPatches(pyramid, frame.camera, target, start);
-  const auto templates = PatchTemplates(target, start.world_from_camera, frame.camera);
-  if (!seen.ok() || !templates.ok()) return std::nullopt;
+  const auto patches = front_end.FindPatches(target, start);
+  if (!patches.ok()) return std::nullopt;
+  const TargetObservation& seen = patches->observation;
   CameraMotion camera;
-  camera.world_from_camera = seen->world_from_camera;
+  camera.world_from_camera = seen.world_from_camera;
   camera.velocity_m_s = start.velocity_m_s;
   camera.angular_velocity_rad_s = start.angular_velocity_rad_s;
-  filter.Reset(camera, MotionCovariance(seen->pose_covariance, start.velocity_sigma_m_s,
+  filter.Reset(camera, MotionCovariance(seen.pose_covariance, start.velocity_sigma_m_s,
                                         start.angular_velocity_sigma_rad_s));
   std::vector<Eigen::Vector3d> points;
   for (std::size_t k = 0; k < target.points.size(); ++k) {
     points.push_back(target.points[k].point_in_world);
-    AddKnown((*templates)[k], points.back(), start.world_from_camera, map);
+    AddKnown(patches->looks[k], points.back(), start.world_from_camera, map);
   }
-  return Start{true, AtMedianRange(points, seen->world_from_camera)};
+  return Start{true, AtMedianRange(points, seen.world_from_camera)};
 }
 
 std::optional<Start> Starter::Free(FilterState& filter) const {

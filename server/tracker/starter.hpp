@@ -5,10 +5,10 @@
 #include <optional>
 
 #include "server/capture/frame_source.hpp"
-#include "server/features/image_pyramid.hpp"
 #include "server/filter/filter_state.hpp"
 #include "server/map/landmark.hpp"
 #include "server/tracker/births.hpp"
+#include "server/tracker/front_end.hpp"
 #include "server/tracker/tracker_options.hpp"
 
 namespace saccade {
@@ -32,17 +32,14 @@ class Starter {
 
   /// Puts the camera and the known points into an empty filter and map; nothing while it waits for
   /// the target.
-  std::optional<Start> Try(const Frame& frame, const ImagePyramid& pyramid, FilterState& filter,
-                           LandmarkMap& map);
+  std::optional<Start> Try(FrontEnd& front_end, FilterState& filter, LandmarkMap& map);
   bool waits_for_target() const;
   /// True if the known points are to be dropped `frames_since_start` after the start.
   bool TargetExpired(std::int64_t frames_since_start) const;
 
  private:
-  std::optional<Start> TryChessboard(const Frame& frame, const ImagePyramid& pyramid,
-                                     FilterState& filter, LandmarkMap& map);
-  std::optional<Start> TryPatches(const Frame& frame, const ImagePyramid& pyramid,
-                                  FilterState& filter, LandmarkMap& map);
+  std::optional<Start> TryChessboard(FrontEnd& front_end, FilterState& filter, LandmarkMap& map);
+  std::optional<Start> TryPatches(FrontEnd& front_end, FilterState& filter, LandmarkMap& map);
   std::optional<Start> Free(FilterState& filter) const;
 
   SourceInfo source_;

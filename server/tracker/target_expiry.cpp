@@ -11,8 +11,8 @@ constexpr double kDepthSigma = 0.01;  // of the range
 
 }  // namespace
 
-void LetTargetGo(const Frame& frame, const FrameMatcher& matcher, Births& births,
-                 FrameMatches& matches, Map& map, FilterState& filter) {
+void LetTargetGo(const Frame& frame, const FrameMatcher& matcher, FrontEnd& front_end,
+                 Births& births, FrameMatches& matches, Map& map, FilterState& filter) {
   std::optional<NewClone> clone;
   const Rigid3 camera_from_world = filter.camera().world_from_camera.Inverse();
   for (const LandmarkMatch& match : matches.in_view) {
@@ -21,7 +21,7 @@ void LetTargetGo(const Frame& frame, const FrameMatcher& matcher, Births& births
     if (!clone) clone.emplace(filter);
     const double inverse = 1.0 / (camera_from_world * *point).norm();
     births.Plant(frame, match.pixel, {inverse, kDepthSigma * inverse}, clone->id(), matches.motion,
-                 matcher, filter, map.in_use());
+                 matcher, front_end, filter, map.in_use());
   }
   std::vector<FeatureId> expired;
   for (const Landmark& landmark : map.in_use().all()) {

@@ -4,7 +4,7 @@
 #include "server/pipeline/stop_watch.hpp"
 #include "server/tracker/encoder_motion.hpp"
 #include "server/tracker/home.hpp"
-#include "server/tracker/same_picture.hpp"
+#include "server/tracker/picture_front_end.hpp"
 #include "server/tracker/settling.hpp"
 #include "server/tracker/surprise.hpp"
 #include "server/tracker/target_expiry.hpp"
@@ -41,15 +41,20 @@ RelocaliserOptions MakeRelocaliserOptions(const TrackerOptions& options) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Tracker>> Tracker::Create(const SourceInfo& source,
-                                                         const TrackerOptions& options) {
+                                                         const TrackerOptions& options,
+                                                         std::unique_ptr<FrontEnd> front_end) {
   if (const absl::Status status = options.Validate(); !status.ok()) return status;
   if (const absl::Status status = Starter::Check(source); !status.ok()) return status;
-  return std::unique_ptr<Tracker>(new Tracker(source, options));
+  if (!front_end) front_end = std::make_unique<PictureFrontEnd>(source.camera, options);
+  if (const absl::Status status = front_end->Check(source); !status.ok()) return status;
+  return std::unique_ptr<Tracker>(new Tracker(source, options, std::move(front_end)));
 }
 
-Tracker::Tracker(const SourceInfo& source, const TrackerOptions& options)
+Tracker::Tracker(const SourceInfo& source, const TrackerOptions& options,
+                 std::unique_ptr<FrontEnd> front_end)
     : source_(source),
       options_(options),
+      front_end_(std::move(front_end)),
       random_(options.seed),
       filter_(MakeFilterOptions(options, *source.camera)),
       matcher_(options),
@@ -68,6 +73,7 @@ void Tracker::Reset() {
   filter_.Reset(CameraMotion(), Matrix12d::Zero());
   map_.Clear();
   births_.Reset();
+  delayed_.Reset();
   starter_.Reset();
   monitor_.Reset();
   relocaliser_.Clear();
@@ -98,18 +104,15 @@ bool Tracker::Hopeless() const {
 std::shared_ptr<const MapSnapshot> Tracker::Track(const Frame& frame) {
   StopWatch total;
   times_ = StageTimes();
-  const bool usable = frame.camera != nullptr && frame.grey.cols == source_.camera->width() &&
-                      frame.grey.rows == source_.camera->height();
   const double dt = has_frame_ ? Seconds(frame.capture_time_ns - last_frame_.capture_time_ns) : 0.0;
   const bool gap = has_frame_ && IsGap(last_frame_.capture_time_ns, frame.capture_time_ns);
-  if (!usable || (has_frame_ && dt <= 0.0 && !gap) || !pyramid_.Build(frame.grey).ok()) {
-    return Publish(frame, times_);
-  }
+  if (has_frame_ && dt <= 0.0 && !gap) return Publish(frame, times_);
   // One picture again is no measurement: what moves meanwhile is a gap when the next one comes.
-  if (has_frame_ && !gap && SamePicture(frame.grey, last_frame_.grey)) {
+  if (has_frame_ && !gap && front_end_->Repeats(frame)) {
     if (started_ && ++repeated_ > kRepeats) monitor_.Suspend();
     return Publish(frame, times_);
   }
+  if (!front_end_->Take(frame)) return Publish(frame, times_);
   repeated_ = 0;
   if (has_frame_) rate_.Add(dt);
   if (gap) ResumeAfterGap();
@@ -131,37 +134,6 @@ std::shared_ptr<const MapSnapshot> Tracker::Track(const Frame& frame) {
   frames_tracked_ += monitor_.status() == TrackingStatus::kTracking ? 1 : 0;
   times_.total_ms = total.Lap_ms() - times_.waited_ms;
   return Publish(frame, times_);
-}
-
-void Tracker::Begin(const Frame& frame) {
-  StopWatch watch;
-  matches_ = FrameMatches();
-  const auto start = starter_.Try(frame, pyramid_, filter_, map_.in_use());
-  times_.search_ms = watch.Lap_ms();
-  if (!start) {
-    monitor_.WaitForStart();
-    return;
-  }
-  metric_ = start->metric;
-  held_ = metric_ || !options_.start;
-  depth_ = start->depth;
-  matches_ = matcher_.Match(pyramid_, *frame.camera, filter_, map_.in_use(), MotionStep(), random_);
-  births_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/true, matcher_, filter_,
-               map_.in_use(), random_);
-  started_ = filter_.feature_count() > 0 || !map_.in_use().all().empty();
-  times_.manage_ms = watch.Lap_ms();
-  if (!started_) return;  // nothing to see at all: try again with the next frame
-  frames_ = 0;
-  // Features that are born in this frame are seen in it.
-  const int born = static_cast<int>(filter_.feature_count());
-  matches_.attempted += born;
-  matches_.accepted += born;
-  if (held_) {
-    KeepForAdjustment(*frame.camera);
-  } else {
-    finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
-  }
-  if (metric_) monitor_.Record(matches_.attempted, matches_.accepted, true);
 }
 
 bool Tracker::Settled() const {
@@ -190,11 +162,11 @@ void Tracker::PredictAndSearch(const CameraModel& camera, double dt) {
     matches_ = FrameMatches();
     return;
   }
-  matches_ = matcher_.Match(pyramid_, camera, filter_, map_.in_use(), {dt, noise}, random_);
+  matches_ = matcher_.Match(*front_end_, camera, filter_, map_.in_use(), {dt, noise}, random_);
   if (IsWorthWidening(matches_, accepted_before, options_.coasting_below)) {
     WidenAfterSurprise(before, dt, agile, SurpriseOptions(), filter_);
     const double searched_px2 = matches_.searched_px2;
-    matches_ = matcher_.Match(pyramid_, camera, filter_, map_.in_use(), {dt, noise}, random_);
+    matches_ = matcher_.Match(*front_end_, camera, filter_, map_.in_use(), {dt, noise}, random_);
     matches_.searched_px2 += searched_px2;
   }
   times_.search_ms = watch.Lap_ms();
@@ -202,6 +174,7 @@ void Tracker::PredictAndSearch(const CameraModel& camera, double dt) {
 
 void Tracker::Correct(const CameraModel& camera) {
   StopWatch watch;
+  nis_ = 0.0;
   if (matches_.accepted >= kFewestToUpdate) {
     std::vector<Observation> observations;
     for (const LandmarkMatch& match : matches_.in_view) {
@@ -218,6 +191,7 @@ void Tracker::Correct(const CameraModel& camera) {
     }
     const auto report = filter_.Update(camera, observations, matches_.pose.world_from_camera);
     if (!report.ok()) matches_.accepted = 0;
+    nis_ = report.ok() ? report->nis : 0.0;
   }
   times_.update_ms = watch.Lap_ms();
 }
@@ -252,6 +226,15 @@ std::optional<double> Tracker::MovedPx(const CameraModel& camera, double dt) con
   return dt * rate * camera.intrinsics().fx;
 }
 
+void Tracker::Grow(const Frame& frame, bool everywhere) {
+  const auto& landmarks = map_.in_use().all();
+  const FeatureId before = landmarks.empty() ? 0 : landmarks.back().id;
+  births_.Grow(frame, matches_, depth_, everywhere, matcher_, *front_end_, filter_, map_.in_use(),
+               random_);
+  if (!options_.classic || !held_ || (everywhere && !metric_)) return;
+  delayed_.Adopt(before + 1, metric_ ? 1.0 : 1.0 / depth_.inverse_range, map_);
+}
+
 void Tracker::MoveHome() {
   const auto wanted = WantedHome(matches_, filter_, home_, {.least_share = options_.home_share});
   if (wanted && filter_.CountErrorsFrom(*wanted)) home_ = *wanted;
@@ -267,16 +250,16 @@ void Tracker::Manage(const Frame& frame) {
     landmark.Record(match.accepted(), frames_);
   }
   if (starter_.TargetExpired(frames_) && matches_.accepted > 0) {
-    LetTargetGo(frame, matcher_, births_, matches_, map_, filter_);
+    LetTargetGo(frame, matcher_, *front_end_, births_, matches_, map_, filter_);
   }
   retirement_.Apply(Now(), map_, filter_);
+  delayed_.Step(*frame.camera, matches_, matcher_, *front_end_, map_, filter_);
   // With most of the view covered the little that is left is no place to start features from: it
   // would be lost when the cover goes (T46).
   const bool covered = matches_.hidden > matches_.attempted;
   if (!held_) {
     if (telling && !covered) {
-      births_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_,
-                   map_.in_use(), random_);
+      Grow(frame, /*everywhere=*/false);
     }
     SeekStart(frame);
     return;
@@ -288,8 +271,7 @@ void Tracker::Manage(const Frame& frame) {
   times_.waited_ms = refiner_.waited_ms();
   if (!telling || covered) return;
   if (const auto guess = Births::GuessDepth(filter_, matches_)) depth_ = *guess;
-  births_.Grow(frame, pyramid_, matches_, depth_, /*everywhere=*/false, matcher_, filter_,
-               map_.in_use(), random_);
+  Grow(frame, /*everywhere=*/false);
   if (KeepForAdjustment(*frame.camera)) {
     refiner_.Start(frames_, frame.capture_time_ns, map_, filter_);
   }

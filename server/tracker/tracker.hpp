@@ -11,8 +11,10 @@
 #include "server/map/relocaliser.hpp"
 #include "server/tracker/advice.hpp"
 #include "server/tracker/births.hpp"
+#include "server/tracker/delayed_depths.hpp"
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/frame_tracker.hpp"
+#include "server/tracker/front_end.hpp"
 #include "server/tracker/loop_closer.hpp"
 #include "server/tracker/picture_rate.hpp"
 #include "server/tracker/refiner.hpp"
@@ -33,9 +35,11 @@ namespace saccade {
 class Tracker final : public FrameTracker {
  public:
   /// `source`: the camera (never null) and, if the place has one, its target and start pose.
+  /// `front_end`: what answers for its frames; null: their pictures.
   /// InvalidArgument: options out of range, no camera, a target that cannot be used.
   static absl::StatusOr<std::unique_ptr<Tracker>> Create(const SourceInfo& source,
-                                                         const TrackerOptions& options);
+                                                         const TrackerOptions& options,
+                                                         std::unique_ptr<FrontEnd> front_end = {});
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
 
@@ -68,9 +72,16 @@ class Tracker final : public FrameTracker {
                                         double depth_sigma_m) override;
 
   const TrackerOptions& options() const { return options_; }
+  /// What it holds, as of the newest frame; for evaluation. Between two calls of Track() only.
+  const FilterState& filter() const { return filter_; }
+  const Map& map() const { return map_; }
+  const FrameMatches& matches() const { return matches_; }
+  /// Normalised innovation squared of the newest update: of all matches together; 0: none was.
+  double nis() const { return nis_; }
 
  private:
-  Tracker(const SourceInfo& source, const TrackerOptions& options);
+  Tracker(const SourceInfo& source, const TrackerOptions& options,
+          std::unique_ptr<FrontEnd> front_end);
   void Begin(const Frame& frame);
   /// Lost before there was a map that one could come back to.
   void StartAnew(const Frame& frame);
@@ -87,6 +98,8 @@ class Tracker final : public FrameTracker {
   void PredictAndSearch(const CameraModel& camera, double dt);
   void Correct(const CameraModel& camera);
   void Manage(const Frame& frame);
+  /// Starts features where they are wanted; `everywhere`: the first ones.
+  void Grow(const Frame& frame, bool everywhere);
   /// Errors are counted from where the camera is, not from where it once began (WantedHome).
   void MoveHome();
   MapMoment Now() const { return {frames_, home_, depth_.inverse_range}; }
@@ -112,11 +125,13 @@ class Tracker final : public FrameTracker {
 
   SourceInfo source_;
   TrackerOptions options_;
+  std::unique_ptr<FrontEnd> front_end_;  // has last_frame_
   std::mt19937_64 random_;
   FilterState filter_;
   Map map_;
   FrameMatcher matcher_;
   Births births_;
+  DelayedDepths delayed_;  // with options_.classic
   const Retirement retirement_;
   Starter starter_;
   StatusMonitor monitor_;
@@ -125,9 +140,8 @@ class Tracker final : public FrameTracker {
   Refiner refiner_;
   StartFinder finder_;
   LoopCloser loops_;  // reads relocaliser_
-  ImagePyramid pyramid_;
 
-  Frame last_frame_;  // newest that was tracked; its picture is what pyramid_ shows
+  Frame last_frame_;                           // newest that was tracked
   std::optional<MountAngles> previous_mount_;  // of the frame before it
   bool has_frame_ = false;
   int repeated_ = 0;  // times that the newest picture came again
@@ -144,6 +158,7 @@ class Tracker final : public FrameTracker {
   CloneId home_ = 1;  // clone that errors are counted from; at first where the map began
   std::uint64_t generation_ = 0;
   FrameMatches matches_;
+  double nis_ = 0.0;
   StageTimes times_;
   std::optional<Map::Checkpoint> before_relocalisation_;
 };

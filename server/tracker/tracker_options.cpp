@@ -40,6 +40,8 @@ const OptionTable<TrackerOptions>& Table() {
        "frames from its start until its result is taken"},
       {"adjust_live", &O::adjust_live, 0, 1,
        "a late result is taken later; false: it is waited for"},
+      {"classic", &O::classic, 0, 1,
+       "new features wait until particles agree on their range (Davison 2003)"},
       {"range_only", &O::range_only, 0, 1, "bearings frozen at birth"},
       {"pixel_sigma_px", &O::pixel_sigma_px, 0.01, 20, "of a match at the picture's centre"},
       {"pixel_sigma_growth", &O::pixel_sigma_growth, 0, 10,

@@ -64,7 +64,10 @@ struct TrackerOptions {
   double wake_angle_sigma_rad = 0.01;  // ...and of that camera's direction
   int births_per_clone = 15;           // features that share one pose clone (slam-spec 5.4)
   double corner_min_score = 2000.0;    // see CornerOptions; plain walls must still give some
-  double initial_depth_m = 1.0;        // of the first features without a target: sets the scale
+  /// New features wait outside the updates until their range is known (DelayedDepths); false: used
+  /// at once with what is known of it. Without a target, once the map's scale is held.
+  bool classic = false;
+  double initial_depth_m = 1.0;  // of the first features without a target: sets the scale
 
   // Start without a target.
   bool start = true;  // wait until pictures hold the scale; false: as soon as some depths are known

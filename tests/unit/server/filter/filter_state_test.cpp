@@ -417,6 +417,30 @@ TEST(FilterState, PureRotationInventsNoDepthFromBiasedMatches) {
   EXPECT_LE(false_depth, 2);
 }
 
+/// A range found elsewhere takes the place of what was known of it; the line of sight stays.
+TEST(FilterState, ToldRangesReplaceTheirOwnAlone) {
+  Simulation sim(5, 20, FilterOptions());
+  sim.BirthAll(1.0, 0.5, 0.5);
+  sim.filter_.Predict(1.0 / 30, MotionNoise());
+  const auto line = sim.filter_.LineOf(3);
+  ASSERT_TRUE(line.has_value());
+  const double range = sim.points_[2].norm();
+  sim.filter_.TellRange(3, 1.0 / range, 1e-9);
+  const FeatureMarginal told = sim.filter_.Marginal(3);
+  EXPECT_DOUBLE_EQ(told.inverse_range, 1.0 / range);
+  EXPECT_DOUBLE_EQ(told.inverse_range_sigma, 1e-9);
+  EXPECT_DOUBLE_EQ(sim.filter_.Marginal(4).inverse_range, 1.0);
+  EXPECT_DOUBLE_EQ(sim.filter_.Marginal(4).inverse_range_sigma, 0.5);
+  // With its range known the line is all that its pixel is unsure of.
+  const auto predicted = sim.filter_.Predicted(sim.lens_, 3);
+  ASSERT_TRUE(predicted.has_value());
+  Eigen::Matrix<double, 2, 14> h;
+  h << predicted->at.d_camera, predicted->at.d_clone, predicted->at.d_point.leftCols<2>();
+  EXPECT_LT((h * line->covariance * h.transpose() - predicted->covariance).norm(),
+            1e-9 * predicted->covariance.norm());
+  EXPECT_FALSE(sim.filter_.LineOf(99).has_value());
+}
+
 /// T13 too: a feature whose depth is unknown still tells of the camera's rotation.
 TEST(FilterState, UndelayedFeaturesHoldRotationFromTheSecondFrame) {
   Simulation sim(33, 30, FilterOptions());

@@ -61,11 +61,13 @@ class Scene {
     ASSERT_TRUE(filter.Update(lens_, seen, filter.camera().world_from_camera).ok());
   }
 
-  /// Frames, a feature removed, a clone with a new feature: everything a journal must carry.
+  /// Frames, a feature removed, a range told, a clone with a new feature: everything a journal must
+  /// carry.
   void GoOn(FilterState& filter) {
     for (int k = 5; k < 8; ++k) Frame(filter, k);
     const FeatureId gone[] = {4};
     filter.Remove(gone);
+    filter.TellRange(5, 0.5, 0.05);
     const CloneId clone = filter.AddClone();
     FeatureBirth birth;
     birth.id = newest_ + 1;
