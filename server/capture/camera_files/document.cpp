@@ -6,6 +6,7 @@
 #include <absl/strings/strip.h>
 
 #include "server/capture/camera_files/opencv_xml.hpp"
+#include "server/capture/stray_file.hpp"
 #include "shared/io/regular_file.hpp"
 
 namespace saccade {
@@ -34,6 +35,9 @@ absl::StatusOr<CameraDocument> LoadCameraDocument(const std::filesystem::path& f
   absl::StatusOr<std::string> text = ReadRegularFile(path, kMaxBytes, "a camera file");
   if (!text.ok()) return text.status();
   const std::string name = path.string();
+  if (const std::string stray = NameOfStray(*text); !stray.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(name, ": ", stray));
+  }
   absl::string_view begin = *text;
   absl::ConsumePrefix(&begin, "\xEF\xBB\xBF");
   if (absl::StartsWith(absl::StripLeadingAsciiWhitespace(begin), "<")) {
