@@ -13,6 +13,7 @@
 #include "server/tracker/births.hpp"
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/frame_tracker.hpp"
+#include "server/tracker/lens_evidence.hpp"
 #include "server/tracker/loop_closer.hpp"
 #include "server/tracker/picture_rate.hpp"
 #include "server/tracker/refiner.hpp"
@@ -120,6 +121,8 @@ class Tracker final : public FrameTracker {
   const Retirement retirement_;
   Starter starter_;
   StatusMonitor monitor_;
+  LensEvidence lens_evidence_{LensEvidenceOptions()};  // the source's, as the rate is
+  bool lens_told_ = false;                             // in the log
   PictureRate rate_;  // the source's: a new map changes nothing about it
   Relocaliser relocaliser_;
   Refiner refiner_;
