@@ -16,6 +16,7 @@
 #include "server/capture/frame_decoder.hpp"
 #include "server/capture/gap.hpp"
 #include "server/capture/image_list.hpp"
+#include "server/capture/picture_size.hpp"
 #include "server/capture/target_file.hpp"
 #include "shared/io/log.hpp"
 #include "shared/io/regular_file.hpp"
@@ -259,7 +260,8 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenDataset(const std::filesystem::
                                                    folder.string(), " has frames 0:", count));
   }
   const absl::StatusOr<CameraIntrinsics> camera =
-      LoadCamera(options.camera_file.empty() ? folder / "camera.yaml" : options.camera_file);
+      LoadCamera(options.camera_file.empty() ? folder / "camera.yaml" : options.camera_file,
+                 [&] { return SizeOfFirstPicture(folder, *entries, options.first_frame); });
   if (!camera.ok()) return camera.status();
 
   SourceInfo info;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/capture/camera_files/plausibility.hpp"
 #include "server/capture/image_file.hpp"
 
 namespace saccade {
@@ -48,7 +49,8 @@ absl::Status FrameDecoder::CheckSize(cv::Size size) const {
   if (size.width == camera_->width() && size.height == camera_->height()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "is ", size.width, "x", size.height, " but camera.yaml says ", camera_->width(), "x",
-      camera_->height(), "; correct width and height (and fx, fy, cx, cy with them)"));
+      camera_->height(), "; correct width and height (and fx, fy, cx, cy with them): ",
+      SizeRemedy(camera_->intrinsics(), size)));
 }
 
 }  // namespace saccade

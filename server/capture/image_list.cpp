@@ -11,6 +11,7 @@
 #include <limits>
 #include <utility>
 
+#include "server/capture/list_line.hpp"
 #include "shared/io/regular_file.hpp"
 
 namespace saccade {
@@ -113,6 +114,9 @@ absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::pat
         "one line `SECONDS FILE` for each picture"));
   }
   if (!list.ok()) return list.status();
+  if (const std::string wrong = WhatIsWrongWithList(*list); !wrong.empty()) {
+    return At(file, 1, wrong);
+  }
   std::vector<ImageEntry> entries;
   int line = 0;
   for (const absl::string_view text : absl::StrSplit(*list, '\n')) {
@@ -122,6 +126,9 @@ absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::pat
     if (line == 1) absl::ConsumePrefix(&rest, "\xEF\xBB\xBF");
     rest = absl::StripAsciiWhitespace(rest);
     if (rest.empty() || rest.front() == '#') continue;
+    if (const std::string wrong = WhatIsWrongWithLine(rest); !wrong.empty()) {
+      return At(file, line, absl::StrCat(Quoted(rest), " ", wrong));
+    }
     const std::size_t gap = rest.find_first_of(" \t");
     if (gap == absl::string_view::npos) {
       return At(file, line, absl::StrCat(Quoted(rest), " has no file name; write `SECONDS FILE`"));

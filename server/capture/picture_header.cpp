@@ -1,12 +1,16 @@
 #include "server/capture/picture_header.hpp"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <string>
 #include <string_view>
+
+#include "server/capture/stray_file.hpp"
 
 namespace saccade {
 namespace {
@@ -133,6 +137,10 @@ absl::StatusOr<cv::Size> ReadPictureSize(std::span<const std::uint8_t> data) {
     size = TiffSize(data);
   } else if (StartsWith(data, "RIFF"sv)) {
     size = WebpSize(data);
+  } else if (const std::string stray =
+                 NameOfStray({reinterpret_cast<const char*>(data.data()), data.size()});
+             !stray.empty()) {
+    return absl::DataLossError(absl::StrCat("it ", stray));
   } else {
     return absl::DataLossError(
         "it is damaged or not a picture that is read here (PNG, JPEG, PNM, BMP, TIFF, WebP)");

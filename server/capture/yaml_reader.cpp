@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <map>
 
 #include "shared/io/regular_file.hpp"
 
@@ -32,8 +33,23 @@ YamlReader::YamlReader(const std::filesystem::path& file) : file_(file.string())
     status_ = text.status();
     return;
   }
+  Parse(*text);
+}
+
+YamlReader::YamlReader(std::string file, std::string prefix, const YAML::Node& node)
+    : file_(std::move(file)), prefix_(std::move(prefix)), node_(node) {
+  RefuseRepeatedKeys();
+}
+
+YamlReader YamlReader::FromText(std::string file, const std::string& text) {
+  YamlReader reader(std::move(file), "", YAML::Node());
+  reader.Parse(text);
+  return reader;
+}
+
+void YamlReader::Parse(const std::string& text) {
   try {
-    node_ = YAML::Load(*text);
+    node_ = YAML::Load(text);
   } catch (const YAML::Exception& e) {
     FailAt(e.mark, absl::StrCat("not valid YAML (", e.msg, ")"));
     return;
@@ -42,6 +58,21 @@ YamlReader::YamlReader(const std::filesystem::path& file) : file_(file.string())
     return;
   }
   if (!node_.IsMap()) FailAt(node_.Mark(), "must be a list of `key: value` lines");
+  RefuseRepeatedKeys();
+}
+
+void YamlReader::RefuseRepeatedKeys() {
+  if (!ok() || !node_.IsMap()) return;
+  std::map<std::string, int> lines;
+  for (const auto& entry : node_) {
+    if (!entry.first.IsScalar()) continue;
+    const int line = entry.first.Mark().line + 1;
+    const auto [before, is_new] = lines.try_emplace(entry.first.Scalar(), line);
+    if (is_new) continue;
+    FailAt(entry.first.Mark(), absl::StrCat(prefix_, entry.first.Scalar(), ": is on line ",
+                                            before->second, " already; keep one of the two"));
+    return;
+  }
 }
 
 void YamlReader::FailAt(const YAML::Mark& mark, absl::string_view what) {
@@ -53,7 +84,30 @@ void YamlReader::FailAt(const YAML::Mark& mark, absl::string_view what) {
 void YamlReader::Fail(absl::string_view key, absl::string_view problem) {
   const YAML::Node value = Get(key);
   FailAt(value.IsDefined() ? value.Mark() : YAML::Mark::null_mark(),
-         absl::StrCat(key, ": ", problem));
+         absl::StrCat(prefix_, key, ": ", problem));
+}
+
+int YamlReader::Line(absl::string_view key) const {
+  const YAML::Node value = Get(key);
+  return value.IsDefined() && !value.Mark().is_null() ? value.Mark().line + 1 : 0;
+}
+
+std::vector<std::string> YamlReader::Keys() const {
+  std::vector<std::string> keys;
+  if (!node_.IsMap()) return keys;
+  for (const auto& entry : node_) {
+    if (entry.first.IsScalar()) keys.push_back(entry.first.Scalar());
+  }
+  return keys;
+}
+
+YamlReader YamlReader::Map(absl::string_view key) {
+  const YAML::Node value = Get(key);
+  if (ok() && !value.IsMap()) Fail(key, "missing, or not a map of fields");
+  YamlReader reader(file_, absl::StrCat(prefix_, key, "."),
+                    value.IsMap() ? value : YAML::Node(YAML::NodeType::Map));
+  if (!ok()) reader.status_ = status_;
+  return reader;
 }
 
 void YamlReader::Merge(const YamlReader& other) {
@@ -75,7 +129,7 @@ double YamlReader::Finite(absl::string_view key, const YAML::Node& value) {
   double number = 0.0;
   if (!value.IsScalar() || !absl::SimpleAtod(value.Scalar(), &number) || !std::isfinite(number)) {
     const std::string found = value.IsScalar() ? absl::StrCat("'", value.Scalar(), "'") : "a list";
-    FailAt(value.Mark(), absl::StrCat(key, ": ", found, " is not a finite number"));
+    FailAt(value.Mark(), absl::StrCat(prefix_, key, ": ", found, " is not a finite number"));
     return 0.0;
   }
   return number;
@@ -147,10 +201,11 @@ std::vector<YamlReader> YamlReader::Maps(absl::string_view key) {
   }
   for (const auto& entry : value) {
     if (!entry.IsMap()) {
-      FailAt(entry.Mark(), absl::StrCat(key, ": each entry must be written `- {key: value, ...}`"));
+      FailAt(entry.Mark(),
+             absl::StrCat(prefix_, key, ": each entry must be written `- {key: value, ...}`"));
       return {};
     }
-    maps.push_back(YamlReader(file_, entry));
+    maps.push_back(YamlReader(file_, "", entry));
   }
   return maps;
 }
@@ -161,7 +216,7 @@ void YamlReader::AllowOnly(std::initializer_list<absl::string_view> keys) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
     if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
       FailAt(entry.first.Mark(),
-             absl::StrCat(key, ": unknown field; known are ", absl::StrJoin(keys, ", ")));
+             absl::StrCat(prefix_, key, ": unknown field; known are ", absl::StrJoin(keys, ", ")));
     }
   }
 }

@@ -28,6 +28,8 @@ class YamlReader {
 
   /// Loads `file`, which must be a regular file of at most 1 MiB and hold a map.
   explicit YamlReader(const std::filesystem::path& file);
+  /// The same of text that was read already; `file` is for messages. Only the first document in it.
+  static YamlReader FromText(std::string file, const std::string& text);
 
   const absl::Status& status() const { return status_; }
   bool ok() const { return status_.ok(); }
@@ -46,18 +48,29 @@ class YamlReader {
   bool Has(absl::string_view key) const;
   /// Readers of the maps in the list `key`.
   std::vector<YamlReader> Maps(absl::string_view key);
+  /// Reader of the map `key`, whose fields are called `key.field` in messages.
+  YamlReader Map(absl::string_view key);
+  std::vector<std::string> Keys() const;
+  bool IsMap(absl::string_view key) const { return Get(key).IsMap(); }
+  bool IsList(absl::string_view key) const { return Get(key).IsSequence(); }
+  /// Line of the value of `key`, from 1; 0 without one.
+  int Line(absl::string_view key) const;
   /// Records an error at the line of `key`.
   void Fail(absl::string_view key, absl::string_view problem);
   /// Takes over another reader's error.
   void Merge(const YamlReader& other);
 
  private:
-  YamlReader(std::string file, const YAML::Node& node) : file_(std::move(file)), node_(node) {}
+  YamlReader(std::string file, std::string prefix, const YAML::Node& node);
+  void Parse(const std::string& text);
+  /// One key twice: which of them counts, nobody can say.
+  void RefuseRepeatedKeys();
   YAML::Node Get(absl::string_view key) const;
   void FailAt(const YAML::Mark& mark, absl::string_view what);
   double Finite(absl::string_view key, const YAML::Node& value);
 
   std::string file_;
+  std::string prefix_;  // of field names in messages
   YAML::Node node_;
   absl::Status status_;
 };

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "server/tracker/lens_evidence.hpp"
+
 namespace saccade {
 namespace {
 
@@ -31,6 +33,8 @@ std::string WordsForStart(const Difficulties& seen) {
 }  // namespace
 
 std::string AdviceFor(const StatusMonitor& monitor, const Difficulties& seen) {
+  // Nothing else that the wearer may do helps as long as this is so.
+  if (seen.lens_growth) return LensWords(*seen.lens_growth);
   switch (monitor.status()) {
     case TrackingStatus::kInitialising:
       return WordsForStart(seen);

@@ -10,10 +10,11 @@ namespace saccade {
 /// What the tracker sees of its wearer's difficulties.
 struct Difficulties {
   bool waits_for_target = false;
-  bool turns_followed = false;       // orientation is known, depth is not yet
-  double speed_rad_s = 0.0;          // of the camera
-  int in_view = 0;                   // landmarks that were found
-  std::optional<double> too_few_hz;  // pictures a second, where more are needed
+  bool turns_followed = false;        // orientation is known, depth is not yet
+  double speed_rad_s = 0.0;           // of the camera
+  int in_view = 0;                    // landmarks that were found
+  std::optional<double> too_few_hz;   // pictures a second, where more are needed
+  std::optional<double> lens_growth;  // LensEvidence::Growth()
 };
 
 /// What the wearer can do about it, in words; empty if all is well.

@@ -1,5 +1,6 @@
 // The part of the tracker that tells others what it knows.
 #include "server/tracker/tracker.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -27,6 +28,7 @@ Difficulties Tracker::SeeDifficulties() const {
   seen.speed_rad_s = filter_.WholeMotion().angular_velocity_rad_s.norm();
   seen.in_view = matches_.accepted;
   seen.too_few_hz = rate_.TooFew();
+  seen.lens_growth = lens_evidence_.Growth();
   return seen;
 }
 
@@ -38,7 +40,10 @@ std::shared_ptr<const MapSnapshot> Tracker::Publish(const Frame& frame, const St
   snapshot->status = monitor_.status();
   snapshot->quality = monitor_.quality();
   const CameraMotion camera = filter_.WholeMotion();
-  snapshot->advice = AdviceFor(monitor_, SeeDifficulties());
+  const Difficulties difficulties = SeeDifficulties();
+  snapshot->advice = AdviceFor(monitor_, difficulties);
+  if (difficulties.lens_growth && !lens_told_) Log(snapshot->advice);
+  lens_told_ = lens_told_ || difficulties.lens_growth;
   snapshot->metric = metric_;
   snapshot->world_from_camera = camera.world_from_camera;
   snapshot->pose_covariance = filter_.PoseCovariance();

@@ -79,6 +79,7 @@ void Tracker::Reset() {
   relocaliser_.Clear();
   refiner_.Reset();
   finder_.Reset();
+  lens_evidence_.ForgetViews();
   matches_ = FrameMatches();
   before_relocalisation_.reset();
   started_ = metric_ = held_ = has_frame_ = false;
@@ -213,6 +214,7 @@ void Tracker::Follow(const Frame& frame, double dt) {
     Revert();
   } else if (confirmed) {
     before_relocalisation_.reset();
+    if (held_) lens_evidence_.Add(*frame.camera, filter_, matches_);
     Manage(frame);
   }
   times_.manage_ms = watch.Lap_ms() - times_.waited_ms;

@@ -15,6 +15,7 @@
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/frame_tracker.hpp"
 #include "server/tracker/front_end.hpp"
+#include "server/tracker/lens_evidence.hpp"
 #include "server/tracker/loop_closer.hpp"
 #include "server/tracker/picture_rate.hpp"
 #include "server/tracker/refiner.hpp"
@@ -54,6 +55,7 @@ class Tracker final : public FrameTracker {
     refiner_.Wait();
     finder_.Wait();
     loops_.Wait();
+    lens_evidence_.WaitForFit();
   }
 
   /// Throws the map away; the next frame starts anew (with the target, where there is one in view).
@@ -135,6 +137,8 @@ class Tracker final : public FrameTracker {
   const Retirement retirement_;
   Starter starter_;
   StatusMonitor monitor_;
+  LensEvidence lens_evidence_{LensEvidenceOptions()};  // the source's, as the rate is
+  bool lens_told_ = false;                             // in the log
   PictureRate rate_;  // the source's: a new map changes nothing about it
   Relocaliser relocaliser_;
   Refiner refiner_;

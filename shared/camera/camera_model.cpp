@@ -54,6 +54,8 @@ double InvertibleRadius(const CameraIntrinsics& c) {
     case LensModel::kKannalaBrandt:
       return FirstNonPositive<4>({3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]},
                                  0.5 * std::numbers::pi - 1e-4);
+    case LensModel::kFov:
+      return kMaxTangent;
   }
   return 0.0;
 }
@@ -153,6 +155,40 @@ std::optional<Vector3d> UnprojectKannalaBrandt(const CameraIntrinsics& c, double
   return Vector3d(distorted.x() * sine, distorted.y() * sine, std::cos(theta));
 }
 
+/// s = 2 tan(w / 2) of the FOV lens.
+double FovStretch(const CameraIntrinsics& c) { return 2.0 * std::tan(0.5 * c.distortion[0]); }
+
+/// r_d = atan(s r) / w (Devernay and Faugeras, 2001), r = tan of the angle to the optic axis.
+std::optional<Vector2d> ProjectFov(const CameraIntrinsics& c, double max_tangent, const Vector3d& p,
+                                   Matrix23d* jacobian) {
+  const double r2 = p.x() * p.x() + p.y() * p.y(), r = std::sqrt(r2);
+  if (!(p.z() > 0.0) || !(r <= max_tangent * p.z())) return std::nullopt;
+  const double w = c.distortion[0], s = FovStretch(c), z = p.z();
+  const bool on_axis = r < 1e-4 * z;
+  const double square = s * s * r2 / (z * z);  // on the axis by its series
+  const double scale =
+      on_axis ? s / (w * z) * (1.0 - square / 3.0) : std::atan2(s * r, z) / (w * r);
+  if (jacobian != nullptr) {
+    const double norm2 = z * z + s * s * r2;
+    const double bend =  // d scale/dX = X bend, d scale/dY = Y bend
+        on_axis ? -2.0 * s * s * s / (3.0 * w * z * z * z) : (s * z / (w * norm2) - scale) / r2;
+    const double along = -s / (w * norm2);
+    *jacobian << c.fx * (scale + p.x() * p.x() * bend), c.fx * p.x() * p.y() * bend,
+        c.fx * p.x() * along, c.fy * p.x() * p.y() * bend, c.fy * (scale + p.y() * p.y() * bend),
+        c.fy * p.y() * along;
+  }
+  return Vector2d(c.fx * scale * p.x() + c.cx, c.fy * scale * p.y() + c.cy);
+}
+
+std::optional<Vector3d> UnprojectFov(const CameraIntrinsics& c, double max_tangent,
+                                     const Vector2d& distorted) {
+  const double w = c.distortion[0], s = FovStretch(c), length = distorted.norm();
+  const double angle = length * w;
+  if (!(angle <= std::atan(s * max_tangent))) return std::nullopt;
+  const double sine = length > 1e-12 ? std::sin(angle) / (s * length) : w / s;
+  return Vector3d(distorted.x() * sine, distorted.y() * sine, std::cos(angle)).normalized();
+}
+
 }  // namespace
 
 CameraModel::CameraModel(const CameraIntrinsics& intrinsics)
@@ -164,6 +200,8 @@ std::optional<Vector2d> CameraModel::Project(const Vector3d& point_in_camera,
   if (c.model == LensModel::kKannalaBrandt) {
     return ProjectKannalaBrandt(c, max_radius_, point_in_camera, d_pixel_d_point);
   }
+  if (c.model == LensModel::kFov)
+    return ProjectFov(c, max_radius_, point_in_camera, d_pixel_d_point);
   if (!(point_in_camera.z() > 0.0)) return std::nullopt;
   const double inverse_z = 1.0 / point_in_camera.z();
   const Vector2d p = point_in_camera.head<2>() * inverse_z;
@@ -207,6 +245,9 @@ std::optional<Vector3d> CameraModel::Unproject(
   std::optional<Vector3d> bearing;
   if (c.model == LensModel::kKannalaBrandt) {
     bearing = UnprojectKannalaBrandt(c, max_radius_, distorted);
+    if (!bearing) return std::nullopt;
+  } else if (c.model == LensModel::kFov) {
+    bearing = UnprojectFov(c, max_radius_, distorted);
     if (!bearing) return std::nullopt;
   } else if (c.model == LensModel::kRadial1) {
     const double ud2 = (pixel - Vector2d(c.cx, c.cy)).squaredNorm();

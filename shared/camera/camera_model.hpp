@@ -7,13 +7,13 @@
 namespace saccade {
 
 /// Lens models of `camera.yaml` (slam-spec section 4).
-enum class LensModel { kPinhole, kRadial1, kBrownConrady, kKannalaBrandt };
+enum class LensModel { kPinhole, kRadial1, kBrownConrady, kKannalaBrandt, kFov };
 
 /// Intrinsics of one camera. Pixel (0, 0) is the centre of the top-left pixel.
 ///
 /// `distortion` by model: radial1 {k1 [px^-2]}, with u_d = u / sqrt(1 + 2 k1 |u|^2) in pixels from
-/// (cx, cy); brown_conrady {k1 k2 p1 p2 k3} (OpenCV order); kannala_brandt {k1 k2 k3 k4}; pinhole
-/// none.
+/// (cx, cy); brown_conrady {k1 k2 p1 p2 k3} (OpenCV order); kannala_brandt {k1 k2 k3 k4}; fov {w
+/// [rad]}, w above 0 and below pi; pinhole none.
 struct CameraIntrinsics {
   LensModel model = LensModel::kPinhole;
   int width = 0;

@@ -134,6 +134,9 @@ absl::StatusOr<CameraIntrinsics> FromProto(const v1::CameraIntrinsics& message,
     case v1::CameraIntrinsics::MODEL_KANNALA_BRANDT:
       out.model = LensModel::kKannalaBrandt, coefficients = 4;
       break;
+    case v1::CameraIntrinsics::MODEL_FOV:
+      out.model = LensModel::kFov, coefficients = 1;
+      break;
     default:
       return Bad(absl::StrCat(field, ".model"), "unknown lens model");
   }

@@ -67,6 +67,8 @@ v1::CameraIntrinsics::Model ToProto(LensModel model) {
       return v1::CameraIntrinsics::MODEL_BROWN_CONRADY;
     case LensModel::kKannalaBrandt:
       return v1::CameraIntrinsics::MODEL_KANNALA_BRANDT;
+    case LensModel::kFov:
+      return v1::CameraIntrinsics::MODEL_FOV;
   }
   return v1::CameraIntrinsics::MODEL_UNSPECIFIED;
 }
@@ -76,6 +78,7 @@ int DistortionSize(LensModel model) {
     case LensModel::kPinhole:
       return 0;
     case LensModel::kRadial1:
+    case LensModel::kFov:
       return 1;
     case LensModel::kBrownConrady:
       return 5;

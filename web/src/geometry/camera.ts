@@ -1,6 +1,6 @@
 import type { Pixel, Vec3 } from './vec3';
 
-export type LensModel = 'pinhole' | 'radial1' | 'brown_conrady' | 'kannala_brandt';
+export type LensModel = 'pinhole' | 'radial1' | 'brown_conrady' | 'kannala_brandt' | 'fov';
 
 /** Same meaning as `camera.yaml`: slam-spec section 4. */
 export interface Intrinsics {
@@ -76,6 +76,8 @@ function makeLens(intrinsics: Intrinsics): Lens {
       return brownConrady(intrinsics.distortion);
     case 'kannala_brandt':
       return kannalaBrandt(intrinsics.distortion);
+    case 'fov':
+      return fieldOfView(intrinsics.distortion);
   }
 }
 
@@ -204,6 +206,29 @@ function kannalaBrandt(distortion: readonly number[]): Lens {
       if (Math.abs(bend(angle) - bent) > 1e-9) return undefined;
       const s = Math.sin(angle) / bent;
       return { x: d.x * s, y: d.y * s, z: Math.cos(angle) };
+    },
+  };
+}
+
+/** r_d = atan(2 r tan(w / 2)) / w, r the tangent of the angle to the optic axis. */
+function fieldOfView(distortion: readonly number[]): Lens {
+  const [w = 0] = distortion;
+  if (!(w > 0)) return pinhole;
+  const s = 2 * Math.tan(w / 2);
+  return {
+    distort: (p) => {
+      if (p.z <= MIN_DEPTH) return undefined;
+      const r = Math.hypot(p.x, p.y);
+      if (r < 1e-12) return { x: 0, y: 0 };
+      const bent = Math.atan2(s * r, p.z) / w;
+      return { x: (bent * p.x) / r, y: (bent * p.y) / r };
+    },
+    undistort: (d) => {
+      const bent = Math.hypot(d.x, d.y);
+      const angle = bent * w;
+      if (angle >= Math.PI / 2) return undefined;
+      const sine = bent < 1e-12 ? w / s : Math.sin(angle) / (s * bent);
+      return { x: d.x * sine, y: d.y * sine, z: Math.cos(angle) };
     },
   };
 }

@@ -113,6 +113,7 @@ const models: Record<Model, LensModel> = {
   [Model.RADIAL1]: 'radial1',
   [Model.BROWN_CONRADY]: 'brown_conrady',
   [Model.KANNALA_BRANDT]: 'kannala_brandt',
+  [Model.FOV]: 'fov',
 };
 
 const toVec3 = (v: Vector3 | undefined): Vec3 => (v ? { x: v.x, y: v.y, z: v.z } : ZERO);

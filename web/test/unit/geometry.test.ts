@@ -38,6 +38,7 @@ const lenses: Intrinsics[] = [
     model: 'kannala_brandt',
     distortion: [-0.01, 0.03, -0.02, 0.004],
   },
+  { ...base, fx: 280, fy: 280, cx: 319.5, cy: 239.5, model: 'fov', distortion: [0.92] },
 ];
 
 const turn: Rigid3 = {
@@ -99,6 +100,20 @@ describe('lens formulas', () => {
     });
     const at = camera.project({ x: 1, y: 0, z: 1 });
     expect(at?.u).toBeCloseTo(100 / Math.sqrt(1.2), 10);
+  });
+
+  it('fov bends as atan(2 r tan(w / 2)) / w', () => {
+    const camera = new Camera({
+      ...base,
+      model: 'fov',
+      fx: 100,
+      fy: 100,
+      cx: 0,
+      cy: 0,
+      distortion: [1],
+    });
+    const at = camera.project({ x: 2, y: 0, z: 1 });
+    expect(at?.u).toBeCloseTo(100 * Math.atan(4 * Math.tan(0.5)), 10);
   });
 
   it('brown_conrady has the five coefficients in OpenCV order', () => {

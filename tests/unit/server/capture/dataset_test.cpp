@@ -126,7 +126,8 @@ TEST_F(Dataset, StartPoseAndHintHoldForFrameZeroOnly) {
 }
 
 TEST_F(Dataset, WrongSizeIsToldAtOnce) {
-  Write("camera.yaml", "model: pinhole\nwidth: 640\nheight: 480\nfx: 60\nfy: 60\ncx: 32\ncy: 24\n");
+  Write("camera.yaml",
+        "model: pinhole\nwidth: 640\nheight: 480\nfx: 600\nfy: 600\ncx: 320\ncy: 240\n");
   EXPECT_THAT(Error(), AllOf(HasSubstr("is 64x48"), HasSubstr("says 640x480")));
 }
 

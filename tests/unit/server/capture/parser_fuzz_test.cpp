@@ -65,6 +65,22 @@ TEST_F(ParserFuzz, Camera) {
       "camera.yaml", kCamera, [](const auto& f) { return LoadCamera(f).status(); }, 2000);
 }
 
+TEST_F(ParserFuzz, CamerasOfOtherPrograms) {
+  const auto load = [](const auto& f) { return LoadCamera(f).status(); };
+  Fuzz("file",
+       "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.2, 0, 0]\n"
+       "  distortion_model: radtan\n  intrinsics: [60, 60, 32, 24]\n  resolution: [64, 48]\n",
+       load, 1000);
+  Fuzz("file", "# head\n1 OPENCV 64 48 60 60 32 24 0.1 0 0 0\n2 PINHOLE 64 48 60 60 32 24\n", load,
+       1000);
+  Fuzz("file",
+       "<?xml version=\"1.0\"?>\n<opencv_storage><image_width>64</image_width><image_height>48"
+       "</image_height><camera_matrix><rows>3</rows><cols>3</cols><data>60 0 32 0 60 24 0 0 1"
+       "</data></camera_matrix><distortion_coefficients><rows>1</rows><cols>4</cols><data>0 0 0 0"
+       "</data></distortion_coefficients></opencv_storage>\n",
+       load, 1000);
+}
+
 TEST_F(ParserFuzz, ImageList) {
   Fuzz(
       "rgb.txt", "# head\n1.000000 rgb/a.png\n1.033333 rgb/b.png\n1.066667 rgb/c.png\n",

@@ -41,6 +41,8 @@ const Case kCases[] = {
     {"brown_conrady_barrel", LensModel::kBrownConrady, {-0.2834, 0.0739, 0.0002, 0.00002, 0}},
     {"brown_conrady_fr1", LensModel::kBrownConrady, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}},
     {"kannala_brandt", LensModel::kKannalaBrandt, {-0.02, 0.011, -0.005, 0.0008}},
+    {"fov", LensModel::kFov, {0.93}},
+    {"fov_nearly_pinhole", LensModel::kFov, {1e-3}},
 };
 
 class EveryLens : public testing::TestWithParam<Case> {
@@ -90,8 +92,11 @@ TEST_P(EveryLens, OpticAxisFallsOnThePrincipalPoint) {
   ASSERT_TRUE(pixel);
   EXPECT_NEAR(pixel->x(), 322.5, 1e-12);
   EXPECT_NEAR(pixel->y(), 236.25, 1e-12);
-  EXPECT_NEAR(jacobian(0, 0), 210.0, 1e-9);
-  EXPECT_NEAR(jacobian(1, 1), 0.99 * 210.0, 1e-9);
+  // The FOV lens magnifies its own axis: 2 tan(w / 2) / w.
+  const double w = GetParam().distortion[0];
+  const double f = GetParam().model == LensModel::kFov ? 210.0 * 2.0 * std::tan(0.5 * w) / w : 210;
+  EXPECT_NEAR(jacobian(0, 0), f, 1e-9);
+  EXPECT_NEAR(jacobian(1, 1), 0.99 * f, 1e-9);
   EXPECT_NEAR(jacobian(0, 2), 0.0, 1e-9);
   const auto bearing = camera_.Unproject({322.5, 236.25});
   ASSERT_TRUE(bearing);
@@ -156,6 +161,18 @@ TEST(CameraModel, Radial1MatchesItsFormula) {
   const auto pixel = camera.Project({0.5, 0, 1});
   ASSERT_TRUE(pixel);
   EXPECT_NEAR(pixel->x() - 322.5, 100.0 / std::sqrt(1 + 2 * 9e-6 * 1e4), 1e-9);
+}
+
+TEST(CameraModel, FovMatchesItsFormulaAndRoundTripsToTheCorner72DegreesOut) {
+  const CameraModel camera = Camera(LensModel::kFov, {0.95}, 300.0);
+  const auto pixel = camera.Project({2, 0, 1});
+  ASSERT_TRUE(pixel);
+  EXPECT_NEAR(pixel->x() - 322.5, 300.0 * std::atan(4.0 * std::tan(0.475)) / 0.95, 1e-9);
+  const auto corner = camera.Unproject({0, 0});
+  ASSERT_TRUE(corner);
+  EXPECT_GT(std::acos(corner->z()) * 180 / 3.14159265, 72.0);
+  EXPECT_LT(WorstRoundTrip_px(camera), 1e-6);
+  EXPECT_FALSE(camera.Unproject({322.5 + 300.0 * 1.66, 236.25})) << "beyond 90 deg";
 }
 
 TEST(CameraModel, ImageEndsAtTheOuterPixelCentres) {

@@ -101,7 +101,7 @@ TEST(RoundTrip, FeatureAndAnnotation) {
 
 TEST(RoundTrip, IntrinsicsOfEveryLens) {
   for (const LensModel model : {LensModel::kPinhole, LensModel::kRadial1, LensModel::kBrownConrady,
-                                LensModel::kKannalaBrandt}) {
+                                LensModel::kKannalaBrandt, LensModel::kFov}) {
     CameraIntrinsics in{
         .model = model, .width = 640, .height = 480, .fx = 500, .fy = 510, .cx = 320, .cy = 240};
     if (model != LensModel::kPinhole) in.distortion[0] = 1e-6;
