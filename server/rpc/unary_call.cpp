@@ -4,9 +4,9 @@
 
 namespace saccade {
 
-absl::StatusOr<Session> UnaryCall::Editor(Gatekeeper& gate, Toll toll,
+absl::StatusOr<Session> UnaryCall::Member(Gatekeeper& gate, std::optional<Toll> toll,
                                           const std::string& session_id) {
-  absl::StatusOr<Session> session = gate.Editor(*context_, toll, session_id);
+  absl::StatusOr<Session> session = gate.Member(*context_, method_, toll, session_id);
   if (session.ok()) Is(*session);
   return session;
 }
