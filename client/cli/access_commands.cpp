@@ -163,6 +163,31 @@ absl::Status RunRevoke(const Options& options, net::AccessClient& client) {
   return absl::OkStatus();
 }
 
+absl::Status RunAudit(const Options& options, net::AccessClient& client) {
+  const absl::StatusOr<std::vector<net::AuditEntry>> entries = client.Audit(options.most);
+  if (!entries.ok()) return entries.status();
+  if (options.json) {
+    nlohmann::json all = nlohmann::json::array();
+    for (const net::AuditEntry& entry : *entries) {
+      all.push_back({{"unix_ms", entry.unix_ms},
+                     {"participant_id", entry.participant_id},
+                     {"display_name", entry.display_name},
+                     {"invite_id", entry.invite_id},
+                     {"call", entry.call},
+                     {"outcome", entry.outcome}});
+    }
+    std::cout << Dump(all, 2) << "\n";
+    return absl::OkStatus();
+  }
+  std::vector<std::vector<std::string>> rows = {{"time", "who", "invite", "call", "outcome"}};
+  for (const net::AuditEntry& entry : *entries) {
+    rows.push_back({TimeText(entry.unix_ms / 1000), entry.display_name, entry.invite_id, entry.call,
+                    entry.outcome});
+  }
+  std::cout << (entries->empty() ? "nothing was done yet\n" : Table(rows));
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 void AddAccess(CLI::App& app, Options& options) {
@@ -191,13 +216,17 @@ void AddAccess(CLI::App& app, Options& options) {
       ->capture_default_str();
   invite->add_option("--label", options.label, "Who it is for, at most 60 bytes");
   app.add_subcommand("invites", "The invites of the server");
+  CLI::App* audit = app.add_subcommand("audit", "Who did what, as far as the server keeps it");
+  audit->add_option("--most", options.most, "So many of the newest")
+      ->check(CLI::Range(1, 10'000))
+      ->capture_default_str();
   CLI::App* revoke = app.add_subcommand("revoke", "End an invite, and throw out who came in by it");
   revoke->add_option("id", options.id, "Its id, as `saccade invites` shows it")->required();
 }
 
 bool IsAccessCommand(Command command) {
   return command == Command::kTrust || command == Command::kInvite ||
-         command == Command::kInvites || command == Command::kRevoke;
+         command == Command::kInvites || command == Command::kRevoke || command == Command::kAudit;
 }
 
 absl::Status RunAccess(const Options& options) {
@@ -217,6 +246,8 @@ absl::Status RunAccess(const Options& options) {
       return RunInvite(options, client);
     case Command::kInvites:
       return RunInvites(options, client);
+    case Command::kAudit:
+      return RunAudit(options, client);
     default:
       return RunRevoke(options, client);
   }

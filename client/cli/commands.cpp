@@ -204,6 +204,7 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kInvite:
     case Command::kInvites:
     case Command::kRevoke:
+    case Command::kAudit:
       return RunAccess(options);
   }
   return absl::InternalError("unknown command");

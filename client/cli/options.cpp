@@ -154,7 +154,8 @@ Command CommandOf(const CLI::App& app) {
       {"trust", Command::kTrust},
       {"invite", Command::kInvite},
       {"invites", Command::kInvites},
-      {"revoke", Command::kRevoke}};
+      {"revoke", Command::kRevoke},
+      {"audit", Command::kAudit}};
   const CLI::App* chosen = app.get_subcommands().front();
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());

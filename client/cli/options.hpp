@@ -38,6 +38,7 @@ enum class Command {
   kInvite,
   kInvites,
   kRevoke,
+  kAudit,
 };
 
 /// The command line, parsed and checked.
@@ -56,14 +57,15 @@ struct Options {
   // How the server is reached; ResolveAccess makes `connection` of it.
   std::string trust;  // PEM file; empty: the system's store
   bool tls = false, plain = false;
-  std::string invite;        // link or token to redeem
-  std::string data_dir;      // of a server on this machine; empty: its default
-  std::string from;          // trust: HOST:PORT of its page; empty: data_dir
-  bool fingerprint = false;  // trust: that alone
-  std::string invite_role;   // invite
-  std::string life, label;   // invite: "8h"; for whom
-  std::uint32_t uses = 1;    // invite
-  double gaze_s = 0;         // fixate, home: end after this time; 0: see --help
+  std::string invite;         // link or token to redeem
+  std::string data_dir;       // of a server on this machine; empty: its default
+  std::string from;           // trust: HOST:PORT of its page; empty: data_dir
+  bool fingerprint = false;   // trust: that alone
+  std::string invite_role;    // invite
+  std::string life, label;    // invite: "8h"; for whom
+  std::uint32_t most = 1000;  // audit
+  std::uint32_t uses = 1;     // invite
+  double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".

@@ -112,4 +112,17 @@ absl::StatusOr<int> AccessClient::Revoke(const std::string& id) {
   return static_cast<int>(response->passes());
 }
 
+absl::StatusOr<std::vector<AuditEntry>> AccessClient::Audit(std::uint32_t most) {
+  v1::ListAuditRequest request;
+  request.set_most(most);
+  const auto response = impl_->Call(&v1::AccessService::Stub::ListAudit, request);
+  if (!response.ok()) return response.status();
+  std::vector<AuditEntry> all;
+  for (const v1::AuditEntry& entry : response->entries()) {
+    all.push_back({entry.unix_ms(), entry.participant_id(), entry.display_name(), entry.invite_id(),
+                   entry.call(), entry.outcome()});
+  }
+  return all;
+}
+
 }  // namespace saccade::net

@@ -29,6 +29,12 @@ struct Pass {
   std::int64_t expires_unix_s = 0;
 };
 
+/// What somebody did. Ids as in presence and in the list of invites; empty: not known.
+struct AuditEntry {
+  std::int64_t unix_ms = 0;
+  std::string participant_id, display_name, invite_id, call, outcome;
+};
+
 /// Invites of one server. Calls block, errors as of Connection.
 class AccessClient {
  public:
@@ -43,6 +49,8 @@ class AccessClient {
   absl::StatusOr<std::vector<Invite>> List();
   /// How many passes ended with it.
   absl::StatusOr<int> Revoke(const std::string& id);
+  /// The newest `most` (1 to 10000; 0: 1000), oldest first.
+  absl::StatusOr<std::vector<AuditEntry>> Audit(std::uint32_t most);
 
  private:
   class Impl;

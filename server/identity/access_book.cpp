@@ -14,11 +14,13 @@
 
 #include "server/identity/access_rows.hpp"
 #include "server/identity/secret.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr std::size_t kMaxWaiting = 256;
+constexpr std::size_t kMaxUnwritten = 1000;    // entries of the audit
 constexpr std::int64_t kKept_s = 30 * 86'400;  // an ended invite stays in the list so long
 constexpr std::int64_t kLeastLife_s = 60, kMostLife_s = 31'536'000;
 constexpr int kMostUses = 1000;
@@ -120,7 +122,29 @@ class AccessBook::Impl {
     refuse(absl::ResourceExhaustedError("access: too many requests wait for the disk"));
   }
 
+  void Record(AuditFacts entry) {
+    if (rows_ == nullptr) return;
+    entry.unix_ms = std::chrono::duration_cast<std::chrono::milliseconds>(
+                        std::chrono::system_clock::now().time_since_epoch())
+                        .count();
+    const std::lock_guard guard(mutex_);
+    if (unwritten_.size() >= kMaxUnwritten) {
+      ++lost_;
+      return;
+    }
+    if (const auto pass = passes_.find(entry.access_id); pass != passes_.end()) {
+      entry.invite_id = pass->second.invite_id;
+    }
+    unwritten_.push_back(std::move(entry));
+  }
+
   // From here: the book's thread.
+
+  absl::StatusOr<std::vector<AuditFacts>> ReadAudit(int most) {
+    if (rows_ == nullptr) return std::vector<AuditFacts>();
+    WriteAudit();
+    return rows_->ReadAudit(most);
+  }
 
   absl::StatusOr<Issued> CreateInvite(const InviteDraft& draft) {
     if (absl::Status valid = draft.Validate(); !valid.ok()) return valid;
@@ -233,8 +257,26 @@ class AccessBook::Impl {
       }
       for (const std::function<void()>& job : jobs) job();
       TellEnded();
+      WriteAudit();
       if (jobs.empty() && stop.stop_requested()) return;
     }
+  }
+
+  void WriteAudit() {
+    std::vector<AuditFacts> entries;
+    std::size_t lost = 0;
+    {
+      const std::lock_guard guard(mutex_);
+      entries.swap(unwritten_);
+      lost = std::exchange(lost_, 0);
+    }
+    if (entries.empty()) return;
+    if (lost > 0) {
+      entries.push_back(entries.back());
+      entries.back().call = absl::StrCat("and ", lost, " more that came too fast to be kept");
+    }
+    const absl::Status kept = rows_->Put(entries);
+    if (!kept.ok()) Log(absl::StrCat("audit: ", entries.size(), " entries lost: ", kept.message()));
   }
 
   /// Tells of passes whose invite has ended, each once, by why. Returns their number.
@@ -274,6 +316,8 @@ class AccessBook::Impl {
   absl::flat_hash_map<std::string, InviteRow> invites_;
   absl::flat_hash_map<std::string, PassRow> passes_;
   absl::flat_hash_map<std::string, bool> told_;
+  std::vector<AuditFacts> unwritten_;
+  std::size_t lost_ = 0;
   std::jthread thread_;  // last: uses everything above
 };
 
@@ -313,5 +357,9 @@ void AccessBook::Revoke(std::string invite_id, Done<int> done) {
   impl_->Post([this, id = std::move(invite_id), done] { done(impl_->Revoke(id)); }, done);
 }
 std::vector<InviteFacts> AccessBook::Invites() const { return impl_->Invites(); }
+void AccessBook::Record(AuditFacts entry) { impl_->Record(std::move(entry)); }
+void AccessBook::ReadAudit(int most, Done<std::vector<AuditFacts>> done) {
+  impl_->Post([this, most, done] { done(impl_->ReadAudit(most)); }, done);
+}
 
 }  // namespace saccade

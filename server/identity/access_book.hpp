@@ -39,6 +39,14 @@ struct Issued {
   std::string token;
 };
 
+/// What somebody did, or was refused.
+struct AuditFacts {
+  std::int64_t unix_ms = 0;
+  std::string participant_id, display_name;  // empty: no session was named
+  std::string access_id, invite_id;          // empty: no token; the invite is filled in by the book
+  std::string call, outcome;                 // "AnnotationService/Create", "ok" or code and reason
+};
+
 /// Who may come in: invites, the passes that came of them, and the owner.
 ///
 /// An invite is redeemed for a pass, which is one person's and ends with its invite. Of both, only
@@ -84,6 +92,12 @@ class AccessBook {
   void Revoke(std::string invite_id, Done<int> done);
   /// Newest first.
   std::vector<InviteFacts> Invites() const;
+
+  /// Keeps what somebody did, within half a second; never waits. Of more than a thousand at once
+  /// the rest is counted. Kept where invites are: nothing in memory alone.
+  void Record(AuditFacts entry);
+  /// The newest `most`, oldest first.
+  void ReadAudit(int most, Done<std::vector<AuditFacts>> done);
 
  private:
   class Impl;

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "server/store/store_files.hpp"
@@ -12,6 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kVersion = 1;
+constexpr int kKeptAudit = 100'000;  // rows
 constexpr const char* kTables = R"(
 CREATE TABLE invites(
   id TEXT PRIMARY KEY, secret_sha256 TEXT NOT NULL, role TEXT NOT NULL, label TEXT NOT NULL,
@@ -20,6 +22,10 @@ CREATE TABLE invites(
 CREATE TABLE passes(
   id TEXT PRIMARY KEY, invite_id TEXT NOT NULL REFERENCES invites(id) ON DELETE CASCADE,
   secret_sha256 TEXT NOT NULL) STRICT;
+CREATE TABLE audit(
+  number INTEGER PRIMARY KEY AUTOINCREMENT, unix_ms INTEGER NOT NULL, participant_id TEXT NOT NULL,
+  display_name TEXT NOT NULL, access_id TEXT NOT NULL, invite_id TEXT NOT NULL, call TEXT NOT NULL,
+  outcome TEXT NOT NULL) STRICT;
 PRAGMA user_version = 1;
 )";
 
@@ -73,6 +79,9 @@ absl::Status AccessRows::Load(std::int64_t forget_before_unix_s, std::vector<Inv
   const std::string forget =
       absl::StrCat("DELETE FROM invites WHERE expires_unix_s < ", forget_before_unix_s);
   if (absl::Status done = database_->Execute(forget.c_str()); !done.ok()) return done;
+  const std::string prune = absl::StrCat(
+      "DELETE FROM audit WHERE number <= (SELECT max(number) FROM audit) - ", kKeptAudit);
+  if (absl::Status done = database_->Execute(prune.c_str()); !done.ok()) return done;
   absl::StatusOr<SqliteStatement> all = database_->Prepare("SELECT * FROM invites");
   if (!all.ok()) return all.status();
   for (;;) {
@@ -121,15 +130,65 @@ absl::Status AccessRows::Write(const PassRow& pass) {
   return statement->Run();
 }
 
-absl::Status AccessRows::Put(const InviteRow& invite) { return Write(invite); }
+absl::Status AccessRows::Write(const AuditFacts& entry) {
+  absl::StatusOr<SqliteStatement> statement = database_->Prepare(
+      "INSERT INTO audit(unix_ms, participant_id, display_name, access_id, invite_id, call, "
+      "outcome) "
+      "VALUES(?,?,?,?,?,?,?)");
+  if (!statement.ok()) return statement.status();
+  statement->Bind(0, entry.unix_ms);
+  int parameter = 0;
+  for (const std::string* text : {&entry.participant_id, &entry.display_name, &entry.access_id,
+                                  &entry.invite_id, &entry.call, &entry.outcome}) {
+    statement->Bind(++parameter, std::string_view(*text));
+  }
+  return statement->Run();
+}
 
-absl::Status AccessRows::Put(const InviteRow& invite, const PassRow& pass) {
+template <typename WriteAll>
+absl::Status AccessRows::InTransaction(WriteAll write_all) {
   absl::Status status = database_->Execute("BEGIN IMMEDIATE");
-  if (status.ok()) status = Write(invite);
-  if (status.ok()) status = Write(pass);
+  if (status.ok()) status = write_all();
   if (status.ok()) status = database_->Execute("COMMIT");
   if (!status.ok() && database_->InTransaction()) database_->Execute("ROLLBACK").IgnoreError();
   return status;
+}
+
+absl::Status AccessRows::Put(const InviteRow& invite) { return Write(invite); }
+
+absl::Status AccessRows::Put(const InviteRow& invite, const PassRow& pass) {
+  return InTransaction([&] {
+    const absl::Status status = Write(invite);
+    return status.ok() ? Write(pass) : status;
+  });
+}
+
+absl::Status AccessRows::Put(const std::vector<AuditFacts>& entries) {
+  return InTransaction([&] {
+    absl::Status status;
+    for (auto entry = entries.begin(); status.ok() && entry != entries.end(); ++entry) {
+      status = Write(*entry);
+    }
+    return status;
+  });
+}
+
+absl::StatusOr<std::vector<AuditFacts>> AccessRows::ReadAudit(int most) {
+  absl::StatusOr<SqliteStatement> rows = database_->Prepare(
+      "SELECT unix_ms, participant_id, display_name, access_id, invite_id, call, outcome "
+      "FROM audit ORDER BY number DESC LIMIT ?");
+  if (!rows.ok()) return rows.status();
+  rows->Bind(0, static_cast<std::int64_t>(most));
+  std::vector<AuditFacts> all;
+  for (;;) {
+    const absl::StatusOr<bool> row = rows->Step();
+    if (!row.ok()) return row.status();
+    if (!*row) break;
+    all.push_back({rows->Int(0), rows->Text(1), rows->Text(2), rows->Text(3), rows->Text(4),
+                   rows->Text(5), rows->Text(6)});
+  }
+  std::reverse(all.begin(), all.end());
+  return all;
 }
 
 }  // namespace saccade

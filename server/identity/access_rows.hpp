@@ -34,11 +34,18 @@ class AccessRows {
   // On the disk when they return.
   absl::Status Put(const InviteRow& invite);
   absl::Status Put(const InviteRow& invite, const PassRow& pass);  // both or neither
+  absl::Status Put(const std::vector<AuditFacts>& entries);        // likewise
+
+  /// The newest `most`, oldest first.
+  absl::StatusOr<std::vector<AuditFacts>> ReadAudit(int most);
 
  private:
   explicit AccessRows(std::unique_ptr<SqliteDatabase> database) : database_(std::move(database)) {}
   absl::Status Write(const InviteRow& invite);
   absl::Status Write(const PassRow& pass);
+  absl::Status Write(const AuditFacts& entry);
+  template <typename WriteAll>
+  absl::Status InTransaction(WriteAll write_all);
 
   std::unique_ptr<SqliteDatabase> database_;
 };

@@ -13,6 +13,7 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"AccessService/CreateInvite", kOwner},
     {"AccessService/ListInvites", kOwner},
     {"AccessService/RevokeInvite", kOwner},
+    {"AccessService/ListAudit", kOwner},
 
     {"SessionService/Join", kViewer},
     {"SessionService/Subscribe", kViewer},

@@ -48,6 +48,18 @@ void Fill(const InviteFacts& facts, v1::Invite& invite) {
   invite.set_label(facts.label);
 }
 
+void Fill(const AuditFacts& facts, v1::AuditEntry& entry) {
+  entry.set_unix_ms(facts.unix_ms);
+  entry.set_participant_id(facts.participant_id);
+  entry.set_display_name(facts.display_name);
+  entry.set_access_id(facts.access_id);
+  entry.set_invite_id(facts.invite_id);
+  entry.set_call(facts.call);
+  entry.set_outcome(facts.outcome);
+}
+
+constexpr int kUsualAudit = 1000;
+constexpr std::uint32_t kMostAudit = 10'000;
 constexpr int kMostNumber = 1'000'000'000;  // beyond every limit, and within int
 
 absl::StatusOr<InviteDraft> FromProto(const v1::CreateInviteRequest& request) {
@@ -69,7 +81,7 @@ absl::StatusOr<InviteDraft> FromProto(const v1::CreateInviteRequest& request) {
 grpc::ServerUnaryReactor* AccessService::GetAccess(Context* context,
                                                    const v1::GetAccessRequest* /*request*/,
                                                    v1::GetAccessResponse* response) {
-  const UnaryCall call(*context, "AccessService/GetAccess", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "AccessService/GetAccess", UnaryCall::Log::kNothing);
   if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
     return call.Finish(entered.status());
   }
@@ -87,7 +99,7 @@ grpc::ServerUnaryReactor* AccessService::GetAccess(Context* context,
 
 grpc::ServerUnaryReactor* AccessService::Redeem(Context* context, const v1::RedeemRequest* request,
                                                 v1::RedeemResponse* response) {
-  const UnaryCall call(*context, "AccessService/Redeem", UnaryCall::Log::kAll);
+  UnaryCall call(*context, "AccessService/Redeem", UnaryCall::Log::kAll);
   if (const auto entered = call.Enter(gate_, Toll::kJoin); !entered.ok()) {
     return call.Finish(entered.status());
   }
@@ -102,7 +114,7 @@ grpc::ServerUnaryReactor* AccessService::Redeem(Context* context, const v1::Rede
 grpc::ServerUnaryReactor* AccessService::CreateInvite(Context* context,
                                                       const v1::CreateInviteRequest* request,
                                                       v1::CreateInviteResponse* response) {
-  const UnaryCall call(*context, "AccessService/CreateInvite", UnaryCall::Log::kAll);
+  UnaryCall call(*context, "AccessService/CreateInvite", UnaryCall::Log::kAll);
   if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
     return call.Finish(entered.status());
   }
@@ -119,7 +131,7 @@ grpc::ServerUnaryReactor* AccessService::CreateInvite(Context* context,
 grpc::ServerUnaryReactor* AccessService::ListInvites(Context* context,
                                                      const v1::ListInvitesRequest* /*request*/,
                                                      v1::ListInvitesResponse* response) {
-  const UnaryCall call(*context, "AccessService/ListInvites", UnaryCall::Log::kRefusals);
+  UnaryCall call(*context, "AccessService/ListInvites", UnaryCall::Log::kRefusals);
   if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
     return call.Finish(entered.status());
   }
@@ -130,13 +142,32 @@ grpc::ServerUnaryReactor* AccessService::ListInvites(Context* context,
 grpc::ServerUnaryReactor* AccessService::RevokeInvite(Context* context,
                                                       const v1::RevokeInviteRequest* request,
                                                       v1::RevokeInviteResponse* response) {
-  const UnaryCall call(*context, "AccessService/RevokeInvite", UnaryCall::Log::kAll);
+  UnaryCall call(*context, "AccessService/RevokeInvite", UnaryCall::Log::kAll);
   if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
     return call.Finish(entered.status());
   }
   book_.Revoke(request->id(), call.Answer<int>([response](int passes) {
     response->set_passes(static_cast<std::uint32_t>(passes));
   }));
+  return call.reactor();
+}
+
+grpc::ServerUnaryReactor* AccessService::ListAudit(Context* context,
+                                                   const v1::ListAuditRequest* request,
+                                                   v1::ListAuditResponse* response) {
+  UnaryCall call(*context, "AccessService/ListAudit", UnaryCall::Log::kRefusals);
+  if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
+    return call.Finish(entered.status());
+  }
+  if (request->most() > kMostAudit) {
+    return call.Finish(absl::InvalidArgumentError(
+        absl::StrCat("most: ", request->most(), "; give 1 to ", kMostAudit)));
+  }
+  const int most = request->most() == 0 ? kUsualAudit : static_cast<int>(request->most());
+  const auto fill = [response](const std::vector<AuditFacts>& entries) {
+    for (const AuditFacts& facts : entries) Fill(facts, *response->add_entries());
+  };
+  book_.ReadAudit(most, call.Answer<std::vector<AuditFacts>>(fill));
   return call.reactor();
 }
 

@@ -32,6 +32,8 @@ class AccessService final : public v1::AccessService::CallbackService {
                        v1::ListInvitesResponse* response) override;
   Reactor* RevokeInvite(Context* context, const v1::RevokeInviteRequest* request,
                         v1::RevokeInviteResponse* response) override;
+  Reactor* ListAudit(Context* context, const v1::ListAuditRequest* request,
+                     v1::ListAuditResponse* response) override;
 
   AccessBook& book_;
   Gatekeeper& gate_;

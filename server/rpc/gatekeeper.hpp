@@ -29,7 +29,7 @@ class Gatekeeper {
   using Method = absl::string_view;
 
   /// `access` and `sessions` outlive this.
-  Gatekeeper(SessionTable& sessions, const AccessBook& access, const RpcLimits& limits)
+  Gatekeeper(SessionTable& sessions, AccessBook& access, const RpcLimits& limits)
       : sessions_(sessions), access_(access), admission_(limits) {}
 
   /// A call that names no session; without a toll it costs nothing that could be limited.
@@ -43,6 +43,8 @@ class Gatekeeper {
                                  const std::string& session_id);
 
   SessionTable& sessions() { return sessions_; }
+  /// Where what people did is kept.
+  AccessBook& book() { return access_; }
 
  private:
   absl::StatusOr<Access> Check(const Context& context, Method method) const;
@@ -50,7 +52,7 @@ class Gatekeeper {
                                       const std::string& session_id);
 
   SessionTable& sessions_;
-  const AccessBook& access_;
+  AccessBook& access_;
   Admission admission_;
 };
 

@@ -37,7 +37,7 @@ grpc::ServerUnaryReactor* GazeService::Order(Context* context, const Request* re
 grpc::ServerUnaryReactor* GazeService::GetState(Context* context,
                                                 const v1::GetGazeStateRequest* /*request*/,
                                                 v1::GetGazeStateResponse* response) {
-  const UnaryCall call(*context, "GazeService/GetState", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "GazeService/GetState", UnaryCall::Log::kNothing);
   const absl::Status entered = call.Enter(gate_, Toll::kRead).status();
   if (entered.ok()) *response->mutable_state() = wire::ToProto(*backend_.gaze());
   return call.Finish(entered);
@@ -129,7 +129,7 @@ grpc::ServerUnaryReactor* GazeService::CalibrateMount(Context* context,
 grpc::ServerUnaryReactor* GazeService::GetMountCalibration(
     Context* context, const v1::GetMountCalibrationRequest* /*request*/,
     v1::GetMountCalibrationResponse* response) {
-  const UnaryCall call(*context, "GazeService/GetMountCalibration", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "GazeService/GetMountCalibration", UnaryCall::Log::kNothing);
   if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
     return call.Finish(access.status());
   }

@@ -47,7 +47,7 @@ absl::Status NoMapYet() {
 grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
                                           const v1::GetMapRequest* /*request*/,
                                           v1::GetMapResponse* response) {
-  const UnaryCall call(*context, "MapService/Get", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "MapService/Get", UnaryCall::Log::kNothing);
   if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
     return call.Finish(access.status());
   }
@@ -73,7 +73,7 @@ grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context
 grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* context,
                                              const v1::ExportMapRequest* request,
                                              v1::ExportMapResponse* response) {
-  const UnaryCall call(*context, "MapService/Export", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "MapService/Export", UnaryCall::Log::kNothing);
   const std::optional<TrackedEvent> newest = hub_.newest();
   absl::Status status = call.Enter(gate_, Toll::kRead).status();
   if (status.ok() && !newest) status = NoMapYet();
@@ -91,7 +91,7 @@ grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* contex
 
 grpc::ServerUnaryReactor* MapService::NotYet(grpc::CallbackServerContext* context,
                                              const char* method) {
-  const UnaryCall call(*context, method, UnaryCall::Log::kNothing);
+  UnaryCall call(*context, method, UnaryCall::Log::kNothing);
   if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
     return call.Finish(access.status());
   }

@@ -69,7 +69,7 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::Subscribe(
 grpc::ServerUnaryReactor* SessionService::Acknowledge(grpc::CallbackServerContext* context,
                                                       const v1::AcknowledgeRequest* request,
                                                       v1::AcknowledgeResponse* /*response*/) {
-  const UnaryCall call(*context, "SessionService/Acknowledge", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "SessionService/Acknowledge", UnaryCall::Log::kNothing);
   // Costs nothing that could be limited.
   const absl::StatusOr<Session> session =
       gate_.Member(*context, "SessionService/Acknowledge", std::nullopt, request->session_id());
@@ -81,7 +81,7 @@ grpc::ServerUnaryReactor* SessionService::Acknowledge(grpc::CallbackServerContex
 grpc::ServerUnaryReactor* SessionService::Ping(grpc::CallbackServerContext* context,
                                                const v1::PingRequest* request,
                                                v1::PingResponse* response) {
-  const UnaryCall call(*context, "SessionService/Ping", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "SessionService/Ping", UnaryCall::Log::kNothing);
   if (const auto access = call.Enter(gate_, std::nullopt); !access.ok()) {
     return call.Finish(access.status());
   }
@@ -94,7 +94,7 @@ grpc::ServerUnaryReactor* SessionService::Ping(grpc::CallbackServerContext* cont
 grpc::ServerUnaryReactor* SessionService::GetFrame(grpc::CallbackServerContext* context,
                                                    const v1::GetFrameRequest* request,
                                                    v1::GetFrameResponse* response) {
-  const UnaryCall call(*context, "SessionService/GetFrame", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "SessionService/GetFrame", UnaryCall::Log::kNothing);
   if (const auto access = call.Enter(gate_, Toll::kStill); !access.ok()) {
     return call.Finish(access.status());
   }
@@ -120,7 +120,7 @@ grpc::ServerUnaryReactor* SessionService::GetFrame(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* SessionService::GetStatus(grpc::CallbackServerContext* context,
                                                     const v1::GetStatusRequest* /*request*/,
                                                     v1::GetStatusResponse* response) {
-  const UnaryCall call(*context, "SessionService/GetStatus", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "SessionService/GetStatus", UnaryCall::Log::kNothing);
   if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
     return call.Finish(access.status());
   }

@@ -32,12 +32,10 @@ class UnaryCall {
   void set_log(Log log) { log_ = log; }
 
   // Admission (Gatekeeper); the log names whom it knows from then on.
-  absl::StatusOr<Access> Enter(Gatekeeper& gate, std::optional<Toll> toll) const {
-    return gate.Enter(*context_, method_, toll);
-  }
+  absl::StatusOr<Access> Enter(Gatekeeper& gate, std::optional<Toll> toll);
   absl::StatusOr<Session> Member(Gatekeeper& gate, std::optional<Toll> toll,
                                  const std::string& session_id);
-  void Is(const Session& session) { participant_id_ = session.participant_id; }
+  void Is(const Session& session);
 
   /// For gRPC, where a `done` answers.
   Reactor* reactor() const { return reactor_; }
@@ -60,11 +58,15 @@ class UnaryCall {
   }
 
  private:
+  void NoteAccess();
+  void Keep(const absl::Status& status) const;
+
   Context* context_;  // gone once the call is finished
   Reactor* reactor_;
   const char* method_;
   Log log_;
-  std::string participant_id_;  // empty: not known
+  AccessBook* book_ = nullptr;                             // from admission on
+  std::string participant_id_, display_name_, access_id_;  // empty: not known
 };
 
 }  // namespace saccade

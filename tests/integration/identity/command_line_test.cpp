@@ -1,12 +1,14 @@
 // saccade trust, invite, invites, revoke, and every other command over TLS.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "server/identity/certificate.hpp"
@@ -104,6 +106,32 @@ TEST_F(GuardedCommandLine, TheOwnersOwnCommandsNeedNothingButTheFolder) {
   EXPECT_EQ(status.exit_code, 0) << status.err;
 }
 
+TEST_F(GuardedCommandLine, TheAuditSaysWhoDidWhatAndByWhichInvite) {
+  const nlohmann::json invite =
+      nlohmann::json::parse(Owner({"invite", "--role", "annotator", "--json"}).out);
+  const std::string root = server_->data_dir() + "/tls/authority.pem";
+  const RunResult ann =
+      Saccade({"--server", server_->grpc(), "--trust", root, "--invite", invite["link"], "--name",
+               "Ann", "annotate", "--point", "0,0,1", "--text", "her secret"});
+  EXPECT_EQ(ann.exit_code, 0) << ann.err;
+  EXPECT_EQ(Saccade({"--server", server_->grpc(), "--name", "Ann", "home"}).exit_code, 1);
+  const RunResult audit = Owner({"audit", "--json"});
+  ASSERT_EQ(audit.exit_code, 0) << audit.err;
+  std::vector<std::string> did;
+  for (const nlohmann::json& entry : nlohmann::json::parse(audit.out)) {
+    if (entry["invite_id"] != invite["id"]) continue;
+    const std::string outcome = entry["outcome"];
+    did.push_back(entry["display_name"].get<std::string>() + " " +
+                  entry["call"].get<std::string>() + " " + outcome.substr(0, outcome.find(':')));
+  }
+  EXPECT_THAT(
+      did, ::testing::IsSupersetOf({"Ann SessionService/Join ok", "Ann AnnotationService/Create ok",
+                                    " GazeService/AcquireLease PERMISSION_DENIED"}));
+  EXPECT_THAT(audit.out, HasSubstr("CreateInvite"));
+  EXPECT_THAT(audit.out, ::testing::Not(HasSubstr("her secret")));
+  EXPECT_THAT(Owner({"audit"}).out, HasSubstr("AnnotationService/Create"));
+}
+
 TEST_F(GuardedCommandLine, WhoDoesNotTrustTheRootIsToldWhatToDo) {
   const RunResult result = Saccade({"--server", server_->grpc(), "--tls", "status"});
   EXPECT_EQ(result.exit_code, 1);
@@ -111,6 +139,44 @@ TEST_F(GuardedCommandLine, WhoDoesNotTrustTheRootIsToldWhatToDo) {
   const RunResult plain = Saccade({"--server", server_->grpc(), "--plain", "status"});
   EXPECT_EQ(plain.exit_code, 1);
   EXPECT_THAT(plain.err, HasSubstr("--trust FILE"));
+}
+
+std::unique_ptr<Process> ServeOnATerminal(const std::string& folder) {
+  std::ofstream(folder + "/server.toml") << "[tls]\nrequired = true\n[auth]\nrequired = true\n";
+  const std::string command = std::string(SACCADE_SERVER_PROGRAM) +
+                              " --source 'sim:desk?width=320&height=240' --grpc 127.0.0.1:0 "
+                              "--http 127.0.0.1:0 --run-for 40 --config " +
+                              folder + "/server.toml --data-dir " + folder + "/data";
+  return std::make_unique<Process>(
+      std::vector<std::string>{"/usr/bin/script", "-qefc", command, "/dev/null"});
+}
+
+// A log is read by many: there the server says how links are made. A terminal is its owner's.
+TEST_F(GuardedCommandLine, ATerminalIsShownLinksAndAQrCodeAndALogIsNot) {
+  EXPECT_THAT(server_->process().err(), HasSubstr("saccade invite --role pilot"));
+  EXPECT_THAT(server_->process().err(), ::testing::Not(HasSubstr("#invite=")));
+  const auto terminal = ServeOnATerminal(home_.path());
+  ASSERT_TRUE(terminal->WaitForLine("\"ready\"", seconds(30)).has_value()) << terminal->out();
+  const std::string shown = terminal->out();
+  EXPECT_THAT(shown, HasSubstr("/wearer#invite="));
+  EXPECT_THAT(shown, HasSubstr("Expert (once, 8 h)"));
+  EXPECT_THAT(shown, HasSubstr("\u2580")) << "half a block of the code";
+  terminal->Signal(SIGTERM);
+  terminal->Wait(seconds(5));
+}
+
+TEST(Loopback, NeedsNeitherCertificatesNorInvites) {
+  TemporaryFolder folder;
+  Server server({"--source", "sim:desk?width=320&height=240", "--data-dir", folder / "data"});
+  const RunResult status =
+      RunProgram({SACCADE_PROGRAM, "--server", server.grpc(), "status"}, seconds(20),
+                 {"XDG_STATE_HOME=" + folder / "state", "XDG_DATA_HOME=" + folder / "home"});
+  EXPECT_EQ(status.exit_code, 0) << status.err;
+  for (const char* name : {"tls", "owner.json", "access.sqlite"}) {
+    EXPECT_FALSE(std::filesystem::exists(folder / ("data/" + std::string(name)))) << name;
+  }
+  EXPECT_THAT(server.process().err(), ::testing::Not(HasSubstr("invite")));
+  EXPECT_THAT(server.process().err(), ::testing::Not(HasSubstr("INSECURE")));
 }
 
 // Somebody else with an account on this machine: the folder is closed, and the port wants a token.

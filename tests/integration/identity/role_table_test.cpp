@@ -34,6 +34,7 @@ const std::map<std::string, Least>& Promised() {
                                                     {"AccessService/Redeem", kAnyone},
                                                     {"AccessService/CreateInvite", kOwner},
                                                     {"AccessService/ListInvites", kOwner},
+                                                    {"AccessService/ListAudit", kOwner},
                                                     {"AccessService/RevokeInvite", kOwner},
                                                     {"SessionService/Join", kViewer},
                                                     {"SessionService/Subscribe", kViewer},
