@@ -92,6 +92,8 @@ absl::StatusOr<std::unique_ptr<FrontDoor>> FrontDoor::Open(const ServerConfig& c
     door->access_ = *std::move(book);
   } else {
     door->access_ = AccessBook::InMemory(options);
+    // Of a run that was killed: it would tell `saccade` of a server that is no more.
+    ::unlink((config.data_dir / "owner.json").c_str());
   }
   return door;
 }

@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 #include <openssl/ssl.h>
 
-#include <array>
+#include <chrono>
+#include <thread>
 
 #include "server/identity/certificate.hpp"
 #include "tests/integration/identity/guarded_server.hpp"

@@ -12,7 +12,7 @@
 #include <mutex>
 
 #include "server/identity/secret.hpp"
-#include "tests/integration/support/process.hpp"
+#include "tests/unit/server/identity/temporary_folder.hpp"
 
 namespace saccade {
 namespace {

@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "server/identity/certificate_files.hpp"
-#include "tests/integration/support/process.hpp"
+#include "tests/unit/server/identity/temporary_folder.hpp"
 
 namespace saccade {
 namespace {
