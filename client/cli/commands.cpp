@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "client/cli/access_commands.hpp"
 #include "client/cli/text.hpp"
 
 namespace saccade::cli {
@@ -199,6 +200,12 @@ absl::Status Run(const Options& options, net::Connection& connection) {
       return RunGaze(options, connection);
     case Command::kCalibrateMount:
       return RunCalibrateMount(options, connection);
+    case Command::kTrust:
+    case Command::kInvite:
+    case Command::kInvites:
+    case Command::kRevoke:
+    case Command::kAudit:
+      return RunAccess(options);
   }
   return absl::InternalError("unknown command");
 }

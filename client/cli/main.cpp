@@ -6,6 +6,8 @@
 #include <iostream>
 #include <string>
 
+#include "client/cli/access_commands.hpp"
+#include "client/cli/access_files.hpp"
 #include "client/cli/commands.hpp"
 #include "client/cli/options.hpp"
 #include "client/cli/problem.hpp"
@@ -28,6 +30,8 @@ int Fail(const cli::Options& options, const absl::Status& problem) {
 }
 
 absl::Status RunWithSession(cli::Options& options) {
+  if (cli::IsAccessCommand(options.command)) return cli::RunAccess(options);
+  if (absl::Status resolved = cli::ResolveAccess(options); !resolved.ok()) return resolved;
   net::ConnectionOptions& to = options.connection;
   // Watching is a session of its own; editing goes on in the one of the last run.
   const bool keeps_session = options.command != cli::Command::kWatch;

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <map>
 
+#include "client/cli/access_commands.hpp"
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/text.hpp"
@@ -149,7 +150,12 @@ Command CommandOf(const CLI::App& app) {
       {"stop", Command::kStop},
       {"release", Command::kRelease},
       {"home", Command::kHome},
-      {"calibrate-mount", Command::kCalibrateMount}};
+      {"calibrate-mount", Command::kCalibrateMount},
+      {"trust", Command::kTrust},
+      {"invite", Command::kInvite},
+      {"invites", Command::kInvites},
+      {"revoke", Command::kRevoke},
+      {"audit", Command::kAudit}};
   const CLI::App* chosen = app.get_subcommands().front();
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());
@@ -234,6 +240,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddAnnotations(app, options);
   AddGaze(app, options, raw);
   AddCalibrateMount(app, options);
+  AddAccess(app, options);
 
   try {
     app.parse(argc, argv);

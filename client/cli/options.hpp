@@ -34,6 +34,11 @@ enum class Command {
   kRelease,
   kHome,
   kCalibrateMount,
+  kTrust,
+  kInvite,
+  kInvites,
+  kRevoke,
+  kAudit,
 };
 
 /// The command line, parsed and checked.
@@ -49,7 +54,18 @@ struct Options {
   AnnotationDraft draft;                       // annotate; frame_id 0 until `frame` is known
   GazeTarget gaze;                             // fixate
   bool fast = false;                           // fixate: at the mount's own limits
-  double gaze_s = 0;                           // fixate, home: end after this time; 0: see --help
+  // How the server is reached; ResolveAccess makes `connection` of it.
+  std::string trust;  // PEM file; empty: the system's store
+  bool tls = false, plain = false;
+  std::string invite;         // link or token to redeem
+  std::string data_dir;       // of a server on this machine; empty: its default
+  std::string from;           // trust: HOST:PORT of its page; empty: data_dir
+  bool fingerprint = false;   // trust: that alone
+  std::string invite_role;    // invite
+  std::string life, label;    // invite: "8h"; for whom
+  std::uint32_t most = 1000;  // audit
+  std::uint32_t uses = 1;     // invite
+  double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".

@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "client/net/channel.hpp"
 #include "client/net/convert.hpp"
 #include "saccade/v1/annotation.grpc.pb.h"
 #include "saccade/v1/gaze.grpc.pb.h"
@@ -23,22 +24,10 @@
 namespace saccade::net {
 namespace {
 
-constexpr int kMaxAnswerBytes = 64 << 20;  // a lossless picture of a large camera
-constexpr std::uint32_t kWindow = 32;      // events in flight unacknowledged
+constexpr std::uint32_t kWindow = 32;  // events in flight unacknowledged
 constexpr std::uint64_t kAcknowledgeEvery = 8;
 constexpr int kMaxPages = 10000;  // of a list
 constexpr std::chrono::milliseconds kTryAgain(250);
-
-grpc::ChannelArguments ChannelArguments() {
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(kMaxAnswerBytes);
-  // Small windows bound what piles up in the transport while a reader is slow.
-  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 65536);
-  // A proxy of the environment has no business between an expert and a wearable.
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  return arguments;
-}
 
 }  // namespace
 
@@ -67,8 +56,7 @@ class Connection::Impl {
   explicit Impl(const ConnectionOptions& options)
       : options_(options),
         session_id_(options.session_id),
-        channel_(grpc::CreateCustomChannel(options.server, grpc::InsecureChannelCredentials(),
-                                           ChannelArguments())),
+        channel_(MakeChannel(options)),
         session_(v1::SessionService::NewStub(channel_)),
         map_(v1::MapService::NewStub(channel_)),
         annotation_(v1::AnnotationService::NewStub(channel_)),
@@ -84,6 +72,7 @@ class Connection::Impl {
     for (;;) {
       grpc::ClientContext context;
       context.set_deadline(give_up);
+      Authorise(options_, context);
       Response response;
       const grpc::Status status = (stub.*method)(&context, request, &response);
       if (status.ok()) return response;
@@ -130,26 +119,7 @@ class Connection::Impl {
     return absl::OkStatus();
   }
 
-  absl::Status Explain(const grpc::Status& status) const {
-    const auto code = static_cast<absl::StatusCode>(status.error_code());
-    switch (status.error_code()) {
-      case grpc::StatusCode::UNAVAILABLE:
-        return absl::Status(
-            code, absl::StrCat("no server answers at ", options_.server,
-                               "; start saccade-server, or name another with --server HOST:PORT"));
-      case grpc::StatusCode::DEADLINE_EXCEEDED:
-        return absl::Status(
-            code, absl::StrFormat("%s did not answer within %.1f s; is it busy, or is that port "
-                                  "not Saccade's gRPC port? (--timeout waits longer)",
-                                  options_.server, 1e-3 * options_.deadline.count()));
-      case grpc::StatusCode::UNIMPLEMENTED:
-        return absl::Status(
-            code, absl::StrCat("the server at ", options_.server, " does not offer this (",
-                               status.error_message(), "); is it another version?"));
-      default:
-        return absl::Status(code, status.error_message());
-    }
-  }
+  absl::Status Explain(const grpc::Status& status) const { return net::Explain(options_, status); }
 
   static bool IsForgottenSession(const absl::Status& status) {
     return status.message().find("session_id") != absl::string_view::npos &&
@@ -175,6 +145,7 @@ class Connection::Impl {
       request.add_topics(topic);
     }
     grpc::ClientContext context;
+    Authorise(options_, context);
     const std::unique_ptr<grpc::ClientReader<v1::Event>> reader =
         session_->Subscribe(&context, request);
     v1::Event message;

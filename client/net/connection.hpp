@@ -27,6 +27,11 @@ struct ConnectionOptions {
   /// A session joined earlier, to go on with; empty: join when a call first needs one. Secret: who
   /// has it acts as you.
   std::string session_id;
+  /// TLS, with `root_pem` for whom to trust; empty: the system's store. False: plain.
+  bool tls = false;
+  std::string root_pem;
+  /// What the server lets in by (AccessClient::Redeem); secret. Empty: none.
+  std::string token;
 
   absl::Status Validate() const;
 };

@@ -11,10 +11,12 @@ find_package(CLI11 REQUIRED)
 find_package(Boost REQUIRED)
 find_package(Ceres REQUIRED)
 find_package(SQLite3 REQUIRED)
+find_package(OpenSSL 3 REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(OpenH264 REQUIRED IMPORTED_TARGET openh264)
 pkg_check_modules(OSMesa REQUIRED IMPORTED_TARGET osmesa)
 pkg_check_modules(Zstd REQUIRED IMPORTED_TARGET libzstd)
+pkg_check_modules(QrEncode REQUIRED IMPORTED_TARGET libqrencode)
 pkg_check_modules(TextDrawing REQUIRED IMPORTED_TARGET freetype2 harfbuzz fribidi fontconfig)
 
 # OpenCV by module: libopencv-dev, which holds OpenCVConfig.cmake, would pull VTK and videoio in.

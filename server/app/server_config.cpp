@@ -2,11 +2,13 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <absl/strings/strip.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <map>
 #include <set>
 #include <type_traits>
 #include <variant>
@@ -28,8 +30,8 @@ constexpr double kMostLimitsScale = 1000;
 struct Raw {
   std::string config, source, mount = "none", data_dir, camera, grpc = "127.0.0.1:50051",
                               http = "127.0.0.1:8080", gl = "osmesa", speed = "realtime", sim_truth,
-                              web_root;
-  bool insecure = false;
+                              web_root, public_url, tls_certificate, tls_key;
+  bool insecure = false, tls_required = false, auth_required = false;
   double run_for_s = -1.0;
   double limits_scale = 1.0;
   std::int64_t bit_rate = 0;
@@ -38,7 +40,7 @@ struct Raw {
 
 /// One thing that can be said, once for the flag, the file, --help and --print-config.
 struct Setting {
-  const char* key;   // in the file; null: a flag only
+  const char* key;   // in the file ("tls.key": of its table); null: a flag only
   const char* flag;  // null: in the file only
   std::variant<std::string Raw::*, bool Raw::*, double Raw::*, std::int64_t Raw::*> field;
   std::string help;
@@ -54,15 +56,30 @@ const std::vector<Setting>& Settings() {
        "camera file instead of the source's own: camera.yaml, Kalibr's, ROS's..."},
       {"grpc", "--grpc", &Raw::grpc, "HOST:PORT, port 0: any (127.0.0.1:50051)"},
       {"http", "--http", &Raw::http, "HOST:PORT, port 0: any (127.0.0.1:8080)"},
-      {"insecure", "--insecure", &Raw::insecure, "serve beyond this machine without TLS or roles"},
+      {"insecure", "--insecure", &Raw::insecure,
+       "serve beyond this machine without TLS and invites: for laboratories"},
+      {"public_url", "--public-url", &Raw::public_url,
+       "https://HOST[:PORT] that invite links begin with, e.g. of a reverse proxy"},
       {"gl", "--gl", &Raw::gl, "osmesa | egl"},
       {"speed", "--speed", &Raw::speed, "realtime | max (every frame, as fast as it can)"},
       {nullptr, "--run-for", &Raw::run_for_s, "end after so many seconds"},
       {nullptr, "--sim-truth", &Raw::sim_truth, "JSON lines of the simulator's truth"},
       {"web_root", nullptr, &Raw::web_root, "the page's files; empty: where they were built"},
       {"seed", nullptr, &Raw::seed, "of the tracker and of a simulated mount"},
+      {"tls.certificate", "--tls-certificate", &Raw::tls_certificate,
+       "PEM file, with those above it; empty: one of an authority of this server's own"},
+      {"tls.key", "--tls-key", &Raw::tls_key, "PEM file of its private key"},
+      {"tls.required", nullptr, &Raw::tls_required, "TLS on loopback, too"},
+      {"auth.required", nullptr, &Raw::auth_required, "invites on loopback, too"},
   };
   return settings;
+}
+
+/// Table and key; the table is empty at the top of the file.
+std::pair<std::string, std::string> SplitKey(const std::string& key) {
+  const std::size_t dot = key.find('.');
+  if (dot == std::string::npos) return {"", key};
+  return {key.substr(0, dot), key.substr(dot + 1)};
 }
 
 void AddFlags(CLI::App& app, Raw& raw) {
@@ -97,6 +114,7 @@ std::string DefaultFile() {
   const auto add = [&text](const std::string& line, const std::string& help) {
     absl::StrAppend(&text, absl::StrFormat("%-44s # %s\n", line, help));
   };
+  std::string last_table;
   for (const Setting& setting : Settings()) {
     if (setting.key == nullptr) continue;
     const std::string value = std::visit(
@@ -110,7 +128,10 @@ std::string DefaultFile() {
           }
         },
         setting.field);
-    add(absl::StrCat(setting.key, " = ", value), setting.help);
+    const auto [table, key] = SplitKey(setting.key);
+    if (table != last_table) absl::StrAppend(&text, "\n[", table, "]\n");
+    last_table = table;
+    add(absl::StrCat(key, " = ", value), setting.help);
   }
   absl::StrAppend(&text, "\n[video]\n");
   add("bit_rate_bit_s = 0", BitRateWords());
@@ -132,6 +153,29 @@ void Take(const toml::value& table, const std::string& key, bool given, T& out,
   if (!given) out = toml::find<T>(table, key);
 }
 
+/// What Settings() name, at the top of the file and in their tables.
+absl::Status TakeSettings(const CLI::App& app, const toml::value& root, Raw& raw,
+                          std::set<std::string>& left) {
+  std::map<std::string, std::set<std::string>> tables;  // and their keys
+  for (const Setting& setting : Settings()) {
+    if (setting.key == nullptr) continue;
+    const bool flag_wins = setting.flag != nullptr && app.count(setting.flag) > 0;
+    const auto [table, key] = SplitKey(setting.key);
+    if (!table.empty() && !root.contains(table)) continue;
+    const toml::value& from = table.empty() ? root : toml::find(root, table);
+    std::set<std::string>& keys = table.empty() ? left : tables[table];
+    if (left.erase(table) > 0) {
+      for (const auto& [name, value] : from.as_table()) keys.insert(name);
+    }
+    std::visit([&, name = key](auto field) { Take(from, name, flag_wins, raw.*field, keys); },
+               setting.field);
+  }
+  for (const auto& [table, keys] : tables) {
+    if (!keys.empty()) return Bad(absl::StrCat("unknown key ", table, ".", *keys.begin()));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status ReadFile(const CLI::App& app, Raw& raw) {
   if (raw.config.empty()) return absl::OkStatus();
   absl::StatusOr<toml::value> parsed = ParseTomlFile(raw.config);
@@ -140,13 +184,7 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
   try {
     std::set<std::string> left;
     for (const auto& [key, value] : root.as_table()) left.insert(key);
-    const auto given = [&app](const char* flag) { return app.count(flag) > 0; };
-    for (const Setting& setting : Settings()) {
-      if (setting.key == nullptr) continue;
-      const bool flag_wins = setting.flag != nullptr && given(setting.flag);
-      std::visit([&](auto field) { Take(root, setting.key, flag_wins, raw.*field, left); },
-                 setting.field);
-    }
+    if (absl::Status taken = TakeSettings(app, root, raw, left); !taken.ok()) return taken;
     if (root.contains("video")) {
       const toml::value& video = toml::find(root, "video");
       std::set<std::string> keys;
@@ -194,11 +232,35 @@ absl::Status CheckAddresses(const Raw& raw, ServerConfig& config) {
     absl::StatusOr<Address> address = Address::Parse(*text, flag);
     if (!address.ok()) return address.status();
     *out = *address;
-    if (!config.insecure && !address->loopback()) {
-      return Bad(absl::StrCat(flag, ": ", *text,
-                              " is reachable from other machines, without TLS or roles: add "
-                              "--insecure if that network is trusted"));
-    }
+  }
+  return absl::OkStatus();
+}
+
+// "https://saccade.example.org", "https://10.0.0.7:8443": no path, and no user.
+bool IsOrigin(absl::string_view url) {
+  if (!absl::ConsumePrefix(&url, "https://") && !absl::ConsumePrefix(&url, "http://")) return false;
+  return !url.empty() && url.find_first_of("/?#@ ") == absl::string_view::npos;
+}
+
+absl::Status CheckIdentity(const Raw& raw, ServerConfig& config) {
+  config.tls_certificate = raw.tls_certificate;
+  config.tls_key = raw.tls_key;
+  if (raw.tls_certificate.empty() != raw.tls_key.empty()) {
+    return Bad(raw.tls_key.empty() ? "--tls-key is missing: the key of --tls-certificate"
+                                   : "--tls-certificate is missing: what --tls-key is the key of");
+  }
+  if (config.insecure && (raw.tls_required || !raw.tls_certificate.empty())) {
+    return Bad("--insecure: says no TLS, and tls.* says TLS: leave one of them out");
+  }
+  config.tls_required = raw.tls_required;
+  config.auth_required = raw.auth_required || (!config.insecure && (config.beyond_loopback()));
+  config.public_url = raw.public_url;
+  absl::string_view trimmed = config.public_url;
+  absl::ConsumeSuffix(&trimmed, "/");
+  config.public_url = std::string(trimmed);
+  if (!config.public_url.empty() && !IsOrigin(config.public_url)) {
+    return Bad(absl::StrCat("--public-url: '", raw.public_url,
+                            "' is not like https://saccade.example.org"));
   }
   return absl::OkStatus();
 }
@@ -214,6 +276,7 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   config.camera_file = raw.camera;
   config.insecure = raw.insecure;
   if (absl::Status addresses = CheckAddresses(raw, config); !addresses.ok()) return addresses;
+  if (absl::Status identity = CheckIdentity(raw, config); !identity.ok()) return identity;
   absl::StatusOr<GlBackend> gl = ParseGlBackend(raw.gl);
   if (!gl.ok()) return Bad(absl::StrCat("--gl: ", gl.status().ToString()));
   config.gl = *gl;

@@ -31,6 +31,10 @@ struct ServerConfig {
   Address grpc{"127.0.0.1", 50051};
   Address http{"127.0.0.1", 8080};
   bool insecure = false;
+  std::filesystem::path tls_certificate, tls_key;  // empty: of an authority of our own
+  bool tls_required = false;                       // on loopback, too
+  bool auth_required = false;  // calls need a token: asked for, or beyond loopback and not insecure
+  std::string public_url;      // without a slash at its end; empty: found out
   GlBackend gl = GlBackend::kOsmesa;
   bool every_frame = false;  // --speed max
   std::optional<double> run_for_s;
@@ -42,6 +46,13 @@ struct ServerConfig {
   std::uint64_t seed = 1;          // seed
   /// Its [tracker], [gaze], [mount_model] and drivers' tables are theirs to read.
   std::filesystem::path config_file;
+
+  /// Whether one of the addresses can be reached from other machines.
+  bool beyond_loopback() const { return !grpc.loopback() || !http.loopback(); }
+  /// Whether this one speaks TLS.
+  bool WantsTls(const Address& address) const {
+    return tls_required || !tls_certificate.empty() || (!insecure && !address.loopback());
+  }
 
   /// Parses the command line. An error is bad usage (exit 2); `--help`, `--version` and
   /// `--print-config` print and give nothing.

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/app/engine.hpp"
+#include "server/app/front_door.hpp"
 #include "server/app/memory.hpp"
 #include "server/app/open_source.hpp"
 #include "server/app/server_config.hpp"
@@ -95,6 +96,17 @@ void SayReady(const ServerConfig& config, int grpc_port, int http_port) {
   Announce(ready.dump());
 }
 
+void LetIn(FrontDoor& door, const ServerConfig& config, RpcServerOptions& options) {
+  options.access = &door.access();
+  options.insecure = door.insecure();
+  options.make_link = [&door](AccessRole role, const std::string& token) {
+    return door.LinkOf(role, token);
+  };
+  if (const std::optional<ServerIdentity> tls = door.TlsOf(config.grpc)) {
+    options.tls = TlsPair{tls->chain_pem, tls->key_pem};
+  }
+}
+
 // One line, also where a library's own words have several.
 void SayProblem(const absl::Status& problem) {
   std::string line(problem.message());
@@ -114,21 +126,34 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   const absl::Cleanup no_commit = [&shutdown] { shutdown.SetCommit(nullptr); };
   shutdown.SetCommit(
       [&engine](std::chrono::milliseconds limit) { return (*engine)->FlushStore(limit); });
-  shutdown.SetPhase("opening the ports");
   hub.Connect(engine->get());
   RpcServerOptions rpc_options;
   rpc_options.host = config.grpc.host;
   rpc_options.port = config.grpc.port;
   rpc_options.limits = RpcLimits().Scaled(config.limits_scale);
+  shutdown.SetPhase("making certificates");
+  const absl::StatusOr<std::unique_ptr<FrontDoor>> door = FrontDoor::Open(config);
+  if (!door.ok()) return door.status();
+  LetIn(**door, config, rpc_options);
+  shutdown.SetPhase("opening the ports");
   absl::StatusOr<std::unique_ptr<RpcServer>> rpc = RpcServer::Start(rpc_options, **engine, hub);
   if (!rpc.ok()) return rpc.status();
   GatewayOptions gateway_options;
   gateway_options.host = config.http.host;
   gateway_options.port = config.http.port;
   gateway_options.web_root = WebRoot(config);
+  gateway_options.allowed_hosts = (*door)->allowed_hosts();
+  if (const std::optional<ServerIdentity> tls = (*door)->TlsOf(config.http)) {
+    gateway_options.tls_chain_pem = tls->chain_pem;
+    gateway_options.tls_key_pem = tls->key_pem;
+    gateway_options.root_pem = tls->root_pem;
+    gateway_options.root_sha256 = tls->root_sha256;
+  }
   absl::StatusOr<std::unique_ptr<Gateway>> gateway =
       Gateway::Start(gateway_options, (*rpc)->InProcessChannel());
   if (!gateway.ok()) return gateway.status();
+  const absl::Status announced = (*door)->Announce((*rpc)->port(), (*gateway)->port());
+  if (!announced.ok()) return announced;
   (*engine)->Start();
   shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());
@@ -164,6 +189,9 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   // gRPC's own words for what is said below in one line; whoever wants them sets the variable.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
+  // TLS 1.3 alone. gRPC 1.51 cannot be asked for that: this names what of 1.2 it may use, and is a
+  // cipher that no certificate goes with. Those of 1.3 are another list.
+  setenv("GRPC_SSL_CIPHER_SUITES", "PSK-AES256-GCM-SHA384", /*overwrite=*/1);
   try {
     return saccade::Main(argc, argv);
   } catch (const std::exception& error) {  // no memory, no thread

@@ -4,6 +4,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <exception>
 #include <thread>
@@ -12,6 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/gateway/http_connection.hpp"
+#include "server/gateway/trust_page.hpp"
 #include "server/pipeline/descriptors.hpp"
 #include "shared/io/log.hpp"
 
@@ -46,9 +48,14 @@ absl::Status GatewayOptions::Validate() const {
 class Gateway::Impl {
  public:
   Impl(const GatewayOptions& options, std::shared_ptr<grpc::Channel> channel, StaticFiles files)
-      : options_(options), context_{std::move(files),          HostCheck(options.allowed_hosts),
-                                    options.max_request_bytes, options.read_timeout,
-                                    options.write_timeout,     {}} {
+      : options_(options),
+        context_{std::move(files),
+                 HostCheck(options.allowed_hosts),
+                 options.max_request_bytes,
+                 options.read_timeout,
+                 options.write_timeout,
+                 {},
+                 nullptr} {
     context_.call = [this, channel = std::move(channel)](CallRequest request,
                                                          UpstreamCall::Handlers handlers) {
       // The guard keeps `Run` going until the call is over, so that its end is never lost.
@@ -62,6 +69,7 @@ class Gateway::Impl {
   }
 
   absl::Status Listen() {
+    if (absl::Status ready = PrepareTls(); !ready.ok()) return ready;
     error_code error;
     const tcp::endpoint endpoint(net::ip::make_address(options_.host),
                                  static_cast<std::uint16_t>(options_.port));
@@ -98,6 +106,34 @@ class Gateway::Impl {
   int port() const { return port_; }
 
  private:
+  absl::Status PrepareTls() {
+    if (options_.tls_chain_pem.empty()) return absl::OkStatus();
+    const std::string& chain = options_.tls_chain_pem;
+    const std::string& key = options_.tls_key_pem;
+    error_code error;
+    tls_.use_certificate_chain(net::buffer(chain), error);
+    if (!error) tls_.use_private_key(net::buffer(key), net::ssl::context::pem, error);
+    if (error) {
+      return absl::InvalidArgumentError(absl::StrCat("tls: certificate or key: ", error.message()));
+    }
+    SSL_CTX_set_min_proto_version(tls_.native_handle(), TLS1_3_VERSION);
+    SSL_CTX_set_alpn_select_cb(tls_.native_handle(), ChooseHttp11, nullptr);
+    context_.tls = &tls_;
+    return absl::OkStatus();
+  }
+
+  static int ChooseHttp11(SSL*, const unsigned char** out, unsigned char* size,
+                          const unsigned char* offered, unsigned offered_size, void*) {
+    static constexpr unsigned char kOurs[] = "\x08http/1.1";
+    unsigned char* chosen = nullptr;
+    if (SSL_select_next_proto(&chosen, size, kOurs, sizeof(kOurs) - 1, offered, offered_size) !=
+        OPENSSL_NPN_NEGOTIATED) {
+      return SSL_TLSEXT_ERR_NOACK;
+    }
+    *out = chosen;
+    return SSL_TLSEXT_ERR_OK;
+  }
+
   void Accept() {
     acceptor_.async_accept([this](error_code error, tcp::socket socket) {
       if (stopping_) return;
@@ -155,6 +191,7 @@ class Gateway::Impl {
 
   GatewayOptions options_;
   HttpContext context_;
+  net::ssl::context tls_{net::ssl::context::tls_server};
   std::unordered_map<HttpConnection*, std::weak_ptr<HttpConnection>> connections_;
   bool stopping_ = false;
   int port_ = 0;
@@ -169,6 +206,7 @@ absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& op
   if (const absl::Status valid = options.Validate(); !valid.ok()) return valid;
   absl::StatusOr<StaticFiles> files = StaticFiles::Load(options.web_root);
   if (!files.ok()) return files.status();
+  if (!options.root_pem.empty()) AddTrustPage(options.root_pem, options.root_sha256, *files);
   auto impl = std::make_unique<Impl>(options, std::move(channel), *std::move(files));
   if (const absl::Status listening = impl->Listen(); !listening.ok()) return listening;
   return std::unique_ptr<Gateway>(new Gateway(std::move(impl)));

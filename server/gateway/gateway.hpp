@@ -33,11 +33,18 @@ struct GatewayOptions {
   /// One piece of an answer not taken by the browser for so long ends its connection.
   std::chrono::milliseconds write_timeout{30'000};
 
+  /// TLS 1.3, with this certificate (and those above it) and key as PEM; empty: plain.
+  std::string tls_chain_pem, tls_key_pem;
+  /// Whom to trust, offered at /trust with how to; empty: nobody special.
+  std::string root_pem, root_sha256;
+
   /// InvalidArgument names the field and the remedy.
   absl::Status Validate() const;
 };
 
-/// HTTP/1.1 server for browsers: the web page's files and gRPC-Web.
+/// HTTP/1.1 server for browsers: the web page's files and gRPC-Web, with TLS or without.
+///
+/// Where TLS is spoken, plain HTTP gets /trust and below; anything else is sent to https.
 ///
 /// Every method of the server is reachable (unary and server streaming) without code here: requests
 /// are translated through `grpc::GenericStub`. One thread of its own; calls wait on gRPC's threads.

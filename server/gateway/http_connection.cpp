@@ -2,6 +2,7 @@
 
 #include <array>
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
@@ -24,6 +25,10 @@ namespace http = beast::http;
 namespace net = boost::asio;
 using boost::system::error_code;
 
+using TlsStream = net::ssl::stream<beast::tcp_stream&>;
+
+constexpr char kHandshakeRecord = 0x16;  // what a TLS connection begins with
+constexpr std::chrono::seconds kHandshakeTimeout(10);
 constexpr std::size_t kMaxHeadBytes = 16 * 1024;
 // What may come while we answer: the next requests of a client that pipelines.
 constexpr std::size_t kMaxPipelinedBytes = 512 * 1024;
@@ -47,19 +52,19 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
  public:
   Connection(net::ip::tcp::socket socket, const HttpContext& context,
              std::function<void(HttpConnection*)> on_closed)
-      : stream_(std::move(socket)), context_(context), on_closed_(std::move(on_closed)) {}
+      : tcp_(std::move(socket)), context_(context), on_closed_(std::move(on_closed)) {}
   ~Connection() override { on_closed_(this); }
 
   void Begin(std::string peer) {
     peer_ = std::move(peer);
-    Guarded([this] { ReadRequest(); });
+    Guarded([this] { context_.tls == nullptr ? ReadRequest() : AwaitHandshake(); });
   }
 
   void Close() override {
     if (std::exchange(closed_, true)) return;
     error_code ignored;
-    stream_.socket().shutdown(net::ip::tcp::socket::shutdown_both, ignored);
-    stream_.close();
+    tcp_.socket().shutdown(net::ip::tcp::socket::shutdown_both, ignored);
+    tcp_.close();
     if (call_) call_->Cancel();
   }
 
@@ -79,22 +84,75 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     }
   }
 
+  // --- TLS --------------------------------------------------------------------------------------
+
+  void AwaitHandshake() {
+    idle_since_ = std::chrono::steady_clock::now();
+    tcp_.expires_after(kHandshakeTimeout);
+    tcp_.async_read_some(buffer_.prepare(kReadBytes),
+                         [self = shared_from_this()](error_code error, std::size_t size) {
+                           if (error) return self->Close();
+                           self->Guarded([&] {
+                             self->buffer_.commit(size);
+                             self->Greet();
+                           });
+                         });
+  }
+
+  // Who speaks plain HTTP here is told where to go: browsers try that first, and a phone that does
+  // not trust us yet fetches whom to trust.
+  void Greet() {
+    if (*static_cast<const char*>(buffer_.data().data()) != kHandshakeRecord) {
+      plain_at_tls_ = true;
+      return ReadRequest();
+    }
+    tls_.emplace(tcp_, *context_.tls);
+    tls_->async_handshake(net::ssl::stream_base::server, buffer_.data(),
+                          [self = shared_from_this()](error_code error, std::size_t used) {
+                            // Nobody has anything to say before our answer: what is left over is no
+                            // handshake.
+                            if (error || used != self->buffer_.size()) return self->Close();
+                            self->Guarded([&] {
+                              self->buffer_.consume(used);
+                              self->ReadRequest();
+                            });
+                          });
+  }
+
+  template <class Buffers, class Handler>
+  void ReadSome(const Buffers& buffers, Handler handler) {
+    if (tls_) return tls_->async_read_some(buffers, std::move(handler));
+    tcp_.async_read_some(buffers, std::move(handler));
+  }
+
+  // True: it was answered.
+  bool AnsweredInPlain() {
+    const Request& request = reader_->request();
+    const absl::string_view target = View(request.target());
+    if (!plain_at_tls_ || (target == "/trust" || absl::StartsWith(target, "/trust/"))) return false;
+    keep_alive_ = false;
+    const absl::string_view host = View(request[http::field::host]);
+    Refuse(http::status::permanent_redirect, "this server speaks https",
+           absl::StrCat("https://", host, target));
+    return true;
+  }
+
   void ReadRequest() {
     reader_.emplace(kMaxHeadBytes, context_.max_request_bytes);
     idle_since_ = std::chrono::steady_clock::now();
-    stream_.expires_after(context_.read_timeout);  // for the whole request
+    tcp_.expires_after(context_.read_timeout);  // for the whole request
     TakeRequest();
   }
 
   void ReadMore() {
-    stream_.async_read_some(buffer_.prepare(kReadBytes),
-                            [self = shared_from_this()](error_code error, std::size_t size) {
-                              if (error) return self->Close();
-                              self->Guarded([&] {
-                                self->buffer_.commit(size);
-                                self->TakeRequest();
-                              });
-                            });
+    ReadSome(buffer_.prepare(kReadBytes),
+             [self = shared_from_this()](error_code error, std::size_t size) {
+               if (error) return self->Close();
+               self->Guarded([&] {
+                 self->buffer_.commit(size);
+                 self->TakeRequest();
+               });
+             });
   }
 
   void TakeRequest() {
@@ -125,7 +183,10 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
           absl::StrCat("unknown host '", host,
                        "': use localhost, an address, or add it to gateway.allowed_hosts"));
     }
-    if (!HostCheck::OriginAllowed(View(request[http::field::origin]), host)) {
+    if (AnsweredInPlain()) return;
+    const absl::string_view origin = View(request[http::field::origin]);
+    const bool downgraded = tls_ && !origin.empty() && !absl::StartsWith(origin, "https://");
+    if (downgraded || !HostCheck::OriginAllowed(origin, host)) {
       return Refuse(http::status::forbidden, "pages of other origins may not call this server");
     }
     const auto format = GrpcWebFormatOf(View(request[http::field::content_type]));
@@ -172,9 +233,10 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     WriteWhole(std::move(response));
   }
 
-  void Refuse(http::status status, absl::string_view reason) {
+  void Refuse(http::status status, absl::string_view reason, const std::string& location = "") {
     auto response = std::make_shared<http::response<http::string_body>>(status, 11);
     SetCommonHeaders(*response);
+    if (!location.empty()) response->set(http::field::location, location);
     response->set(http::field::content_type, "text/plain; charset=utf-8");
     response->body() = absl::StrCat(reason, "\n");
     response->prepare_payload();
@@ -200,11 +262,12 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
 
   template <class Body>
   void WriteWhole(std::shared_ptr<http::response<Body>> response) {
-    stream_.expires_after(context_.write_timeout);
-    http::async_write(stream_, *response,
-                      [self = shared_from_this(), response](error_code error, std::size_t) {
-                        self->Guarded([&] { self->OnAnswered(error); });
-                      });
+    tcp_.expires_after(context_.write_timeout);
+    auto done = [self = shared_from_this(), response](error_code error, std::size_t) {
+      self->Guarded([&] { self->OnAnswered(error); });
+    };
+    if (tls_) return http::async_write(*tls_, *response, std::move(done));
+    http::async_write(tcp_, *response, std::move(done));
   }
 
   void OnAnswered(error_code error) {
@@ -215,18 +278,21 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
 
   // Lets an answer sent before the whole request was read arrive: closing at once would reset it.
   void LingerThenClose() {
+    tcp_.expires_after(std::chrono::seconds(2));
+    if (tls_) {
+      return tls_->async_shutdown([self = shared_from_this()](error_code) { self->Close(); });
+    }
     error_code ignored;
-    stream_.socket().shutdown(net::ip::tcp::socket::shutdown_send, ignored);
-    stream_.expires_after(std::chrono::seconds(2));
+    tcp_.socket().shutdown(net::ip::tcp::socket::shutdown_send, ignored);
     Drain();
   }
 
   void Drain() {
-    stream_.async_read_some(net::buffer(drain_),
-                            [self = shared_from_this()](error_code error, std::size_t) {
-                              if (error) return self->Close();
-                              self->Drain();
-                            });
+    tcp_.async_read_some(net::buffer(drain_),
+                         [self = shared_from_this()](error_code error, std::size_t) {
+                           if (error) return self->Close();
+                           self->Drain();
+                         });
   }
 
   // --- gRPC-Web ---------------------------------------------------------------------------------
@@ -303,7 +369,7 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
       if (!watching_) return OnAnswered({});
       // Ends the watch, whose handler goes on: what it has read may be the next request.
       error_code ignored;
-      stream_.socket().cancel(ignored);
+      tcp_.socket().cancel(ignored);
     });
   }
 
@@ -322,28 +388,29 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
   }
 
   void Write(std::function<void()> then) {
-    stream_.expires_after(context_.write_timeout);
-    net::async_write(
-        stream_, net::buffer(out_),
-        [self = shared_from_this(), then = std::move(then)](error_code error, std::size_t) {
-          if (error || self->closed_) return self->Close();
-          self->stream_.expires_never();
-          self->Guarded(then);
-        });
+    tcp_.expires_after(context_.write_timeout);
+    auto done = [self = shared_from_this(), then = std::move(then)](error_code error, std::size_t) {
+      if (error || self->closed_) return self->Close();
+      self->tcp_.expires_never();
+      self->Guarded(then);
+    };
+    if (tls_) return net::async_write(*tls_, net::buffer(out_), std::move(done));
+    net::async_write(tcp_, net::buffer(out_), std::move(done));
   }
 
   // While we answer, a browser sends nothing: what can be read is its leaving. What a client that
   // pipelines sends is kept for its turn; it must be read, or the end behind it is never seen.
   void WatchForDisconnect() {
     answering_ = true;
+    tcp_.expires_never();  // an answer takes as long as it takes
     if (!std::exchange(watching_, true)) Watch();
   }
 
   void Watch() {
-    stream_.socket().async_read_some(
-        net::buffer(watched_), [self = shared_from_this()](error_code error, std::size_t size) {
-          self->Guarded([&] { self->OnWatched(error, size); });
-        });
+    ReadSome(net::buffer(watched_),
+             [self = shared_from_this()](error_code error, std::size_t size) {
+               self->Guarded([&] { self->OnWatched(error, size); });
+             });
   }
 
   void OnWatched(error_code error, std::size_t size) {
@@ -359,7 +426,9 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     Watch();
   }
 
-  beast::tcp_stream stream_;
+  beast::tcp_stream tcp_;
+  std::optional<TlsStream> tls_;  // over tcp_; nothing: plain
+  bool plain_at_tls_ = false;     // plain HTTP where TLS is spoken
   const HttpContext& context_;
   std::function<void(HttpConnection*)> on_closed_;
   beast::flat_buffer buffer_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <chrono>
 #include <cstddef>
 #include <functional>
@@ -23,6 +24,7 @@ struct HttpContext {
   std::chrono::milliseconds write_timeout{};
   /// Starts a call to the gRPC server.
   std::function<std::shared_ptr<UpstreamCall>(CallRequest, UpstreamCall::Handlers)> call;
+  boost::asio::ssl::context* tls = nullptr;  // null: plain
 };
 
 /// One browser connection: requests one after the other, on the gateway's thread.

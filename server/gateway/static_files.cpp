@@ -107,6 +107,12 @@ absl::StatusOr<StaticFiles> StaticFiles::Load(const std::filesystem::path& root)
   return files;
 }
 
+void StaticFiles::Put(const std::string& path, std::string body, absl::string_view content_type) {
+  StaticFile file = MakeFile(std::move(body), "", /*immutable=*/false);
+  file.content_type = std::string(content_type);
+  files_[path] = std::move(file);
+}
+
 const StaticFile* StaticFiles::Find(absl::string_view target) const {
   std::string path(target.substr(0, target.find_first_of("?#")));
   if (path == "/") path = "/index.html";

@@ -33,6 +33,9 @@ class StaticFiles {
   /// Null if there is none.
   const StaticFile* Find(absl::string_view target) const;
 
+  /// Puts one that is not on the disk at `path` ("/trust").
+  void Put(const std::string& path, std::string body, absl::string_view content_type);
+
   std::size_t size() const { return files_.size(); }
 
  private:

@@ -50,7 +50,7 @@ grpc::ServerUnaryReactor* AnnotationService::Edit(grpc::CallbackServerContext* c
                                                   const Request* request, const char* method,
                                                   Make make) {
   UnaryCall call(*context, method, UnaryCall::Log::kAll);
-  const absl::StatusOr<Session> session = call.Editor(gate_, Toll::kEdit, request->session_id());
+  const absl::StatusOr<Session> session = call.Member(gate_, Toll::kEdit, request->session_id());
   if (!session.ok()) return call.Finish(session.status());
   absl::StatusOr<Command> command = make(call, *session);
   if (!command.ok()) return call.Finish(command.status());
@@ -61,7 +61,7 @@ grpc::ServerUnaryReactor* AnnotationService::Edit(grpc::CallbackServerContext* c
 grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext* context,
                                                     const v1::CreateAnnotationRequest* request,
                                                     v1::CreateAnnotationResponse* response) {
-  return Edit(context, request, "Create",
+  return Edit(context, request, "AnnotationService/Create",
               [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
                 if (!request->request_id().empty()) {
                   absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
@@ -80,7 +80,7 @@ grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext* context,
                                                     const v1::UpdateAnnotationRequest* request,
                                                     v1::UpdateAnnotationResponse* response) {
-  return Edit(context, request, "Update",
+  return Edit(context, request, "AnnotationService/Update",
               [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
                 absl::StatusOr<AnnotationPatch> patch = PatchFromProto(*request, ImageOf(backend_));
                 if (!patch.ok()) return patch.status();
@@ -92,7 +92,7 @@ grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext* context,
                                                     const v1::DeleteAnnotationRequest* request,
                                                     v1::DeleteAnnotationResponse* /*response*/) {
-  return Edit(context, request, "Delete",
+  return Edit(context, request, "AnnotationService/Delete",
               [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
                 absl::Status uuid = wire::CheckUuid(request->id(), "id");
                 if (!uuid.ok()) return uuid;
@@ -103,8 +103,10 @@ grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* context,
                                                   const v1::ListAnnotationsRequest* request,
                                                   v1::ListAnnotationsResponse* response) {
-  UnaryCall call(*context, "List", UnaryCall::Log::kRefusals);
-  if (absl::Status often = call.Anyone(gate_, Toll::kRead); !often.ok()) return call.Finish(often);
+  UnaryCall call(*context, "AnnotationService/List", UnaryCall::Log::kRefusals);
+  if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
+    return call.Finish(access.status());
+  }
   call.set_log(UnaryCall::Log::kNothing);
   // Not those of the newest frame: an edit that was answered is here at once. Held: the list is
   // replaced by every frame and edit meanwhile.
@@ -116,7 +118,7 @@ template <typename Request, typename Response>
 grpc::ServerUnaryReactor* AnnotationService::TakeBack(grpc::CallbackServerContext* context,
                                                       const Request* request, bool redo,
                                                       Response* response) {
-  return Edit(context, request, redo ? "Redo" : "Undo",
+  return Edit(context, request, redo ? "AnnotationService/Redo" : "AnnotationService/Undo",
               [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
                 const auto fill = [response](const std::string& description) {
                   response->set_description(description);

@@ -1,5 +1,6 @@
 #include "server/rpc/gatekeeper.hpp"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
@@ -9,11 +10,14 @@
 
 #include <array>
 
+#include "server/identity/role_table.hpp"
+
 namespace saccade {
 namespace {
 
 // The gateway's name for it (server/gateway/upstream_call.hpp), believed only in process.
 constexpr char kPeerMetadata[] = "x-saccade-peer";
+constexpr absl::string_view kBearer = "bearer ";
 
 std::string Address(const std::string& address) {
   std::array<unsigned char, 16> bytes{};
@@ -47,30 +51,67 @@ std::string PeerOf(const grpc::CallbackServerContext& context) {
   return plain;
 }
 
-absl::Status Gatekeeper::Anyone(const Context& context, Toll toll) {
-  return admission_.Anyone(toll, PeerOf(context), MonotonicNow());
+absl::string_view TokenOf(const grpc::CallbackServerContext& context) {
+  const auto& metadata = context.client_metadata();
+  const auto at = metadata.find("authorization");
+  if (at == metadata.end()) return {};
+  absl::string_view value(at->second.data(), at->second.size());
+  if (!absl::StartsWithIgnoreCase(value, kBearer))
+    return value;  // no token of ours, and so refused
+  return absl::StripAsciiWhitespace(value.substr(kBearer.size()));
 }
 
-absl::StatusOr<Session> Gatekeeper::Admit(const Context& context, Toll toll,
-                                          absl::StatusOr<Session> session) {
-  const std::string peer = PeerOf(context);
-  const Timestamp now_ns = MonotonicNow();
-  // Who guesses at sessions is a stranger as well.
-  const absl::Status often =
-      session.ok() ? admission_.Participant(toll, session->participant_id, peer, now_ns)
-                   : admission_.Anyone(Toll::kRead, peer, now_ns);
+absl::StatusOr<Access> Gatekeeper::Check(const Context& context, Method method) const {
+  const std::optional<AccessRole> least = LeastRole(method);
+  if (!least) {
+    return absl::PermissionDeniedError(
+        absl::StrCat("access: ", method, " is not in the table of roles, so nobody may call it"));
+  }
+  absl::StatusOr<Access> access = access_.Check(TokenOf(context));
+  if (*least == AccessRole::kAnyone) return access.ok() ? access : Access{"", *least, 0};
+  if (!access.ok() || access->role >= *least) return access;
+  return absl::PermissionDeniedError(absl::StrCat("access: this takes the role ", Word(*least),
+                                                  ", and yours is ", Word(access->role),
+                                                  "; ask for another invite"));
+}
+
+absl::StatusOr<Access> Gatekeeper::Enter(const Context& context, Method method,
+                                         std::optional<Toll> toll) {
+  absl::StatusOr<Access> access = Check(context, method);
+  // Who guesses at tokens pays as a stranger.
+  if (!access.ok()) toll = Toll::kRead;
+  if (!toll) return access;
+  const absl::Status often = admission_.Anyone(*toll, PeerOf(context), MonotonicNow());
   if (!often.ok()) return often;
+  return access;
+}
+
+absl::StatusOr<Session> Gatekeeper::FindSession(const Access& access, Method method,
+                                                const std::string& session_id) {
+  const bool changes = LeastRole(method) > AccessRole::kViewer;
+  absl::StatusOr<Session> session =
+      changes ? sessions_.FindEditor(session_id) : sessions_.Find(session_id);
+  // As if there were none: a stolen session_id is of no use with another token, nor without one.
+  if (session.ok() && session->access_id != access.id) return SessionTable::UnknownSession();
   return session;
 }
 
-absl::StatusOr<Session> Gatekeeper::Member(const Context& context, Toll toll,
+absl::StatusOr<Session> Gatekeeper::Member(const Context& context, Method method,
+                                           std::optional<Toll> toll,
                                            const std::string& session_id) {
-  return Admit(context, toll, sessions_.Find(session_id));
-}
-
-absl::StatusOr<Session> Gatekeeper::Editor(const Context& context, Toll toll,
-                                           const std::string& session_id) {
-  return Admit(context, toll, sessions_.FindEditor(session_id));
+  const absl::StatusOr<Access> access = Check(context, method);
+  absl::StatusOr<Session> session =
+      access.ok() ? FindSession(*access, method, session_id) : access.status();
+  const std::string peer = PeerOf(context);
+  const Timestamp now_ns = MonotonicNow();
+  absl::Status often;
+  // Who guesses at sessions or tokens is a stranger as well.
+  if (!session.ok()) often = admission_.Anyone(Toll::kRead, peer, now_ns);
+  if (session.ok() && toll) {
+    often = admission_.Participant(*toll, session->participant_id, peer, now_ns);
+  }
+  if (!often.ok()) return often;
+  return session;
 }
 
 }  // namespace saccade

@@ -27,7 +27,7 @@ template <typename Request, typename Make>
 grpc::ServerUnaryReactor* GazeService::Order(Context* context, const Request* request,
                                              const char* method, Make make) {
   UnaryCall call(*context, method, UnaryCall::Log::kAll);
-  const absl::StatusOr<Session> session = call.Editor(gate_, Toll::kGaze, request->session_id());
+  const absl::StatusOr<Session> session = call.Member(gate_, Toll::kGaze, request->session_id());
   if (!session.ok()) return call.Finish(session.status());
   absl::StatusOr<GazeCommand> command = make(call, CallerOf(*session));
   if (!command.ok()) return call.Finish(command.status());
@@ -37,17 +37,17 @@ grpc::ServerUnaryReactor* GazeService::Order(Context* context, const Request* re
 grpc::ServerUnaryReactor* GazeService::GetState(Context* context,
                                                 const v1::GetGazeStateRequest* /*request*/,
                                                 v1::GetGazeStateResponse* response) {
-  const UnaryCall call(*context, "GetState", UnaryCall::Log::kNothing);
-  const absl::Status often = call.Anyone(gate_, Toll::kRead);
-  if (often.ok()) *response->mutable_state() = wire::ToProto(*backend_.gaze());
-  return call.Finish(often);
+  UnaryCall call(*context, "GazeService/GetState", UnaryCall::Log::kNothing);
+  const absl::Status entered = call.Enter(gate_, Toll::kRead).status();
+  if (entered.ok()) *response->mutable_state() = wire::ToProto(*backend_.gaze());
+  return call.Finish(entered);
 }
 
 grpc::ServerUnaryReactor* GazeService::AcquireLease(Context* context,
                                                     const v1::AcquireLeaseRequest* request,
                                                     v1::AcquireLeaseResponse* response) {
   return Order(
-      context, request, "AcquireLease",
+      context, request, "GazeService/AcquireLease",
       [request, response](UnaryCall& call, GazeCaller caller) -> absl::StatusOr<GazeCommand> {
         if (!request->lease_id().empty()) {
           absl::Status uuid = wire::CheckUuid(request->lease_id(), "lease_id");
@@ -69,7 +69,7 @@ grpc::ServerUnaryReactor* GazeService::AcquireLease(Context* context,
 grpc::ServerUnaryReactor* GazeService::ReleaseLease(Context* context,
                                                     const v1::ReleaseLeaseRequest* request,
                                                     v1::ReleaseLeaseResponse* /*response*/) {
-  return Order(context, request, "ReleaseLease",
+  return Order(context, request, "GazeService/ReleaseLease",
                [](UnaryCall& call, GazeCaller caller) -> absl::StatusOr<GazeCommand> {
                  return ReleaseGazeLease{std::move(caller), call.Answer()};
                });
@@ -78,7 +78,7 @@ grpc::ServerUnaryReactor* GazeService::ReleaseLease(Context* context,
 grpc::ServerUnaryReactor* GazeService::Fixate(Context* context, const v1::FixateRequest* request,
                                               v1::FixateResponse* response) {
   return Order(
-      context, request, "Fixate",
+      context, request, "GazeService/Fixate",
       [request, response](UnaryCall& call, GazeCaller caller) -> absl::StatusOr<GazeCommand> {
         absl::StatusOr<GazeTarget> target = wire::FromProto(request->target(), "target");
         if (!target.ok()) return target.status();
@@ -100,35 +100,39 @@ grpc::ServerUnaryReactor* GazeService::Steer(Context* context, const Request* re
 grpc::ServerUnaryReactor* GazeService::StopFixating(Context* context,
                                                     const v1::StopFixatingRequest* request,
                                                     v1::StopFixatingResponse* response) {
-  return Steer(context, request, response, "StopFixating", SteerGaze::What::kStop);
+  return Steer(context, request, response, "GazeService/StopFixating", SteerGaze::What::kStop);
 }
 
 grpc::ServerUnaryReactor* GazeService::Home(Context* context, const v1::HomeRequest* request,
                                             v1::HomeResponse* response) {
-  return Steer(context, request, response, "Home", SteerGaze::What::kHome);
+  return Steer(context, request, response, "GazeService/Home", SteerGaze::What::kHome);
 }
 
 grpc::ServerUnaryReactor* GazeService::KeepHorizon(Context* context,
                                                    const v1::KeepHorizonRequest* request,
                                                    v1::KeepHorizonResponse* response) {
-  return Steer(context, request, response, "KeepHorizon", SteerGaze::What::kHorizon);
+  return Steer(context, request, response, "GazeService/KeepHorizon", SteerGaze::What::kHorizon);
 }
 
 grpc::ServerUnaryReactor* GazeService::Explore(Context* context, const v1::ExploreRequest* request,
                                                v1::ExploreResponse* response) {
-  return Steer(context, request, response, "Explore", SteerGaze::What::kExplore);
+  return Steer(context, request, response, "GazeService/Explore", SteerGaze::What::kExplore);
 }
 
 grpc::ServerUnaryReactor* GazeService::CalibrateMount(Context* context,
                                                       const v1::CalibrateMountRequest* request,
                                                       v1::CalibrateMountResponse* response) {
-  return Steer(context, request, response, "CalibrateMount", SteerGaze::What::kCalibrate);
+  return Steer(context, request, response, "GazeService/CalibrateMount",
+               SteerGaze::What::kCalibrate);
 }
 
 grpc::ServerUnaryReactor* GazeService::GetMountCalibration(
     Context* context, const v1::GetMountCalibrationRequest* /*request*/,
     v1::GetMountCalibrationResponse* response) {
-  const UnaryCall call(*context, "GetMountCalibration", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "GazeService/GetMountCalibration", UnaryCall::Log::kNothing);
+  if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
+    return call.Finish(access.status());
+  }
   const std::shared_ptr<const MountCalibrationReport> report = backend_.gaze()->calibration;
   if (report == nullptr) {
     return call.Finish(absl::NotFoundError(
@@ -141,7 +145,7 @@ grpc::ServerUnaryReactor* GazeService::GetMountCalibration(
 grpc::ServerUnaryReactor* GazeService::Override(Context* context,
                                                 const v1::OverrideRequest* request,
                                                 v1::OverrideResponse* /*response*/) {
-  return Order(context, request, "Override",
+  return Order(context, request, "GazeService/Override",
                [request](UnaryCall& call, GazeCaller caller) -> absl::StatusOr<GazeCommand> {
                  return OverrideGaze{std::move(caller), request->enabled(), call.Answer()};
                });
@@ -149,7 +153,7 @@ grpc::ServerUnaryReactor* GazeService::Override(Context* context,
 
 grpc::ServerUnaryReactor* GazeService::Pause(Context* context, const v1::PauseRequest* request,
                                              v1::PauseResponse* /*response*/) {
-  return Order(context, request, "Pause",
+  return Order(context, request, "GazeService/Pause",
                [request](UnaryCall& call, GazeCaller caller) -> absl::StatusOr<GazeCommand> {
                  return PauseGaze{std::move(caller), request->paused(), call.Answer()};
                });

@@ -47,8 +47,10 @@ absl::Status NoMapYet() {
 grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
                                           const v1::GetMapRequest* /*request*/,
                                           v1::GetMapResponse* response) {
-  const UnaryCall call(*context, "Map.Get", UnaryCall::Log::kNothing);
-  if (absl::Status often = call.Anyone(gate_, Toll::kRead); !often.ok()) return call.Finish(often);
+  UnaryCall call(*context, "MapService/Get", UnaryCall::Log::kNothing);
+  if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
+    return call.Finish(access.status());
+  }
   const std::optional<TrackedEvent> newest = hub_.newest();
   if (!newest) return call.Finish(NoMapYet());
   *response->mutable_map() = FullMap(*newest->snapshot);
@@ -59,8 +61,8 @@ grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
 grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context,
                                             const v1::ResetMapRequest* request,
                                             v1::ResetMapResponse* response) {
-  UnaryCall call(*context, "Map.Reset", UnaryCall::Log::kAll);
-  const absl::StatusOr<Session> session = call.Editor(gate_, Toll::kReset, request->session_id());
+  UnaryCall call(*context, "MapService/Reset", UnaryCall::Log::kAll);
+  const absl::StatusOr<Session> session = call.Member(gate_, Toll::kReset, request->session_id());
   if (!session.ok()) return call.Finish(session.status());
   const auto fill = [response](std::uint64_t generation) {
     response->set_map_generation(generation);
@@ -71,9 +73,9 @@ grpc::ServerUnaryReactor* MapService::Reset(grpc::CallbackServerContext* context
 grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* context,
                                              const v1::ExportMapRequest* request,
                                              v1::ExportMapResponse* response) {
-  const UnaryCall call(*context, "Map.Export", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "MapService/Export", UnaryCall::Log::kNothing);
   const std::optional<TrackedEvent> newest = hub_.newest();
-  absl::Status status = call.Anyone(gate_, Toll::kRead);
+  absl::Status status = call.Enter(gate_, Toll::kRead).status();
   if (status.ok() && !newest) status = NoMapYet();
   if (request->format() != v1::ExportMapRequest::FORMAT_PLY &&
       request->format() != v1::ExportMapRequest::FORMAT_UNSPECIFIED) {
@@ -85,6 +87,33 @@ grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* contex
     response->set_feature_count(static_cast<std::uint32_t>(newest->snapshot->features.size()));
   }
   return call.Finish(status);
+}
+
+grpc::ServerUnaryReactor* MapService::NotYet(grpc::CallbackServerContext* context,
+                                             const char* method) {
+  UnaryCall call(*context, method, UnaryCall::Log::kNothing);
+  if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
+    return call.Finish(access.status());
+  }
+  return call.Finish(absl::UnimplementedError(""));
+}
+
+grpc::ServerUnaryReactor* MapService::Save(grpc::CallbackServerContext* context,
+                                           const v1::SaveMapRequest* /*request*/,
+                                           v1::SaveMapResponse* /*response*/) {
+  return NotYet(context, "MapService/Save");
+}
+
+grpc::ServerUnaryReactor* MapService::Load(grpc::CallbackServerContext* context,
+                                           const v1::LoadMapRequest* /*request*/,
+                                           v1::LoadMapResponse* /*response*/) {
+  return NotYet(context, "MapService/Load");
+}
+
+grpc::ServerUnaryReactor* MapService::List(grpc::CallbackServerContext* context,
+                                           const v1::ListMapsRequest* /*request*/,
+                                           v1::ListMapsResponse* /*response*/) {
+  return NotYet(context, "MapService/List");
 }
 
 }  // namespace saccade

@@ -24,6 +24,17 @@ class MapService final : public v1::MapService::CallbackService {
   grpc::ServerUnaryReactor* Export(grpc::CallbackServerContext* context,
                                    const v1::ExportMapRequest* request,
                                    v1::ExportMapResponse* response) override;
+  grpc::ServerUnaryReactor* Save(grpc::CallbackServerContext* context,
+                                 const v1::SaveMapRequest* request,
+                                 v1::SaveMapResponse* response) override;
+  grpc::ServerUnaryReactor* Load(grpc::CallbackServerContext* context,
+                                 const v1::LoadMapRequest* request,
+                                 v1::LoadMapResponse* response) override;
+  grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context,
+                                 const v1::ListMapsRequest* request,
+                                 v1::ListMapsResponse* response) override;
+  /// UNIMPLEMENTED, to whom the method would be open.
+  grpc::ServerUnaryReactor* NotYet(grpc::CallbackServerContext* context, const char* method);
 
   Backend& backend_;
   StreamHub& hub_;

@@ -4,6 +4,7 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 
+#include "server/rpc/access_service.hpp"
 #include "server/rpc/annotation_service.hpp"
 #include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/gaze_service.hpp"
@@ -38,6 +39,13 @@ void SetArguments(const RpcServerOptions& options, grpc::ServerBuilder& builder)
   builder.SetResourceQuota(grpc::ResourceQuota("rpc").SetMaxThreads(options.max_threads));
 }
 
+std::shared_ptr<grpc::ServerCredentials> CredentialsOf(const RpcServerOptions& options) {
+  if (!options.tls) return grpc::InsecureServerCredentials();
+  grpc::SslServerCredentialsOptions tls;  // of clients no certificate is asked
+  tls.pem_key_cert_pairs.push_back({options.tls->key_pem, options.tls->chain_pem});
+  return grpc::SslServerCredentials(tls);
+}
+
 }  // namespace
 
 class RpcServer::Impl {
@@ -47,12 +55,23 @@ class RpcServer::Impl {
         sessions_(
             options.sessions,
             [&backend](const std::string& id) { return backend.Submit(ForgetSession{id}).ok(); }),
-        gate_(sessions_, options.limits),
+        own_access_(options.access == nullptr ? AccessBook::InMemory({}) : nullptr),
+        access_(options.access == nullptr ? *own_access_ : *options.access),
+        gate_(sessions_, access_, options.limits),
+        access_service_(access_, gate_, options.make_link, options.insecure),
         session_service_(backend, hub, gate_),
         annotation_service_(backend, gate_),
         map_service_(backend, hub, gate_),
-        gaze_service_(backend, gate_) {}
-  ~Impl() { Stop(std::chrono::milliseconds(500)); }
+        gaze_service_(backend, gate_) {
+    access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
+      sessions_.End(ids);
+      hub_.End(ids, why);
+    });
+  }
+  ~Impl() {
+    Stop(std::chrono::milliseconds(500));
+    access_.SetOnEnded(nullptr);
+  }
 
   absl::Status Start(const RpcServerOptions& options) {
     grpc::EnableDefaultHealthCheckService(true);
@@ -69,7 +88,8 @@ class RpcServer::Impl {
     std::unique_ptr<GrpcListener::Acceptor> acceptor =
         builder.experimental().AddExternalConnectionAcceptor(
             grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-            grpc::InsecureServerCredentials());
+            CredentialsOf(options));
+    builder.RegisterService(&access_service_);
     builder.RegisterService(&session_service_);
     builder.RegisterService(&annotation_service_);
     builder.RegisterService(&map_service_);
@@ -98,7 +118,10 @@ class RpcServer::Impl {
  private:
   StreamHub& hub_;
   SessionTable sessions_;
+  const std::unique_ptr<AccessBook> own_access_;
+  AccessBook& access_;
   Gatekeeper gate_;
+  AccessService access_service_;
   SessionService session_service_;
   AnnotationService annotation_service_;
   MapService map_service_;

@@ -3,9 +3,12 @@
 #include <absl/status/statusor.h>
 
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "server/identity/access_book.hpp"
 #include "server/rpc/admission.hpp"
 #include "server/rpc/backend.hpp"
 #include "server/rpc/session_table.hpp"
@@ -16,6 +19,11 @@ class Channel;
 }
 
 namespace saccade {
+
+/// With what a port shows who it is, as PEM: the certificate with those above it, and its key.
+struct TlsPair {
+  std::string chain_pem, key_pem;
+};
 
 struct RpcServerOptions {
   std::string host = "127.0.0.1";
@@ -30,9 +38,16 @@ struct RpcServerOptions {
   /// Reflection is served by threads that wait for their client: no more than these, further ones
   /// get RESOURCE_EXHAUSTED.
   int max_threads = 16;
+  /// TLS on the port; nothing: plain.
+  std::optional<TlsPair> tls;
+  /// Who may come in; outlives the server. Null: everybody, and invites end with the server.
+  AccessBook* access = nullptr;
+  /// What a browser opens with an invite. Any thread.
+  std::function<std::string(AccessRole, const std::string& token)> make_link;
+  bool insecure = false;  // plain beyond loopback: told to every page
 };
 
-/// The gRPC server: every service of saccade.v1, health and reflection, without TLS.
+/// The gRPC server: every service of saccade.v1, health and reflection.
 class RpcServer {
  public:
   /// Binds and serves. `backend` and `hub` (connected to it) outlive the server.

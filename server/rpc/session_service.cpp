@@ -10,6 +10,8 @@
 namespace saccade {
 namespace {
 
+constexpr char kSubscribe[] = "SessionService/Subscribe";
+
 // A stream that cannot start.
 class RefusedStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
  public:
@@ -27,9 +29,10 @@ SessionService::SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gat
 grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* context,
                                                const v1::JoinRequest* request,
                                                v1::JoinResponse* response) {
-  UnaryCall call(*context, "Join", UnaryCall::Log::kAll);
-  if (absl::Status often = call.Anyone(gate_, Toll::kJoin); !often.ok()) return call.Finish(often);
-  const absl::StatusOr<Session> session = gate_.sessions().Join(*request);
+  UnaryCall call(*context, "SessionService/Join", UnaryCall::Log::kAll);
+  const absl::StatusOr<Access> access = call.Enter(gate_, Toll::kJoin);
+  if (!access.ok()) return call.Finish(access.status());
+  const absl::StatusOr<Session> session = gate_.sessions().Join(*request, MonotonicNow(), *access);
   if (!session.ok()) return call.Finish(session.status());
   call.Is(*session);
   const ServerFacts& facts = backend_.facts();
@@ -50,20 +53,26 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::Subscribe(
     return new RefusedStream(absl::InvalidArgumentError("request: is no SubscribeRequest"));
   }
   const absl::StatusOr<Session> session =
-      gate_.Member(*context, Toll::kSubscribe, request.session_id());
+      gate_.Member(*context, kSubscribe, Toll::kSubscribe, request.session_id());
   if (!session.ok()) return new RefusedStream(session.status());
   const absl::StatusOr<SubscriptionOptions> options = SubscriptionOptions::FromProto(request);
-  Audit("Subscribe", session->participant_id, options.status());
+  Audit(kSubscribe, session->participant_id, options.status());
   if (!options.ok()) return new RefusedStream(options.status());
-  return StreamWriter::Open(hub_, *session, *options, *context, gate_.sessions().Hold(session->id));
+  StreamWriter* stream =
+      StreamWriter::Open(hub_, *session, *options, *context, gate_.sessions().Hold(session->id));
+  // Whose token ended between the check and the hub's knowing of the stream.
+  const auto still = gate_.Enter(*context, kSubscribe, std::nullopt);
+  if (!still.ok()) hub_.End({session->access_id}, still.status());
+  return stream;
 }
 
 grpc::ServerUnaryReactor* SessionService::Acknowledge(grpc::CallbackServerContext* context,
                                                       const v1::AcknowledgeRequest* request,
                                                       v1::AcknowledgeResponse* /*response*/) {
-  const UnaryCall call(*context, "Acknowledge", UnaryCall::Log::kNothing);
+  UnaryCall call(*context, "SessionService/Acknowledge", UnaryCall::Log::kNothing);
   // Costs nothing that could be limited.
-  const absl::StatusOr<Session> session = gate_.sessions().Find(request->session_id());
+  const absl::StatusOr<Session> session =
+      gate_.Member(*context, "SessionService/Acknowledge", std::nullopt, request->session_id());
   if (!session.ok()) return call.Finish(session.status());
   return call.Finish(
       hub_.Acknowledge(session->id, request->sequence(), request->request_key_frame()));
@@ -72,17 +81,23 @@ grpc::ServerUnaryReactor* SessionService::Acknowledge(grpc::CallbackServerContex
 grpc::ServerUnaryReactor* SessionService::Ping(grpc::CallbackServerContext* context,
                                                const v1::PingRequest* request,
                                                v1::PingResponse* response) {
+  UnaryCall call(*context, "SessionService/Ping", UnaryCall::Log::kNothing);
+  if (const auto access = call.Enter(gate_, std::nullopt); !access.ok()) {
+    return call.Finish(access.status());
+  }
   response->set_server_receive_ns(MonotonicNow());
   response->set_client_send_ns(request->client_send_ns());
   response->set_server_send_ns(MonotonicNow());
-  return UnaryCall(*context, "Ping", UnaryCall::Log::kNothing).Finish(absl::OkStatus());
+  return call.Finish(absl::OkStatus());
 }
 
 grpc::ServerUnaryReactor* SessionService::GetFrame(grpc::CallbackServerContext* context,
                                                    const v1::GetFrameRequest* request,
                                                    v1::GetFrameResponse* response) {
-  const UnaryCall call(*context, "GetFrame", UnaryCall::Log::kNothing);
-  if (absl::Status often = call.Anyone(gate_, Toll::kStill); !often.ok()) return call.Finish(often);
+  UnaryCall call(*context, "SessionService/GetFrame", UnaryCall::Log::kNothing);
+  if (const auto access = call.Enter(gate_, Toll::kStill); !access.ok()) {
+    return call.Finish(access.status());
+  }
   if (!v1::VideoView_IsValid(request->view())) {
     return call.Finish(absl::InvalidArgumentError(
         absl::StrCat("view: unknown view ", static_cast<int>(request->view()))));
@@ -105,8 +120,10 @@ grpc::ServerUnaryReactor* SessionService::GetFrame(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* SessionService::GetStatus(grpc::CallbackServerContext* context,
                                                     const v1::GetStatusRequest* /*request*/,
                                                     v1::GetStatusResponse* response) {
-  const UnaryCall call(*context, "GetStatus", UnaryCall::Log::kNothing);
-  if (absl::Status often = call.Anyone(gate_, Toll::kRead); !often.ok()) return call.Finish(often);
+  UnaryCall call(*context, "SessionService/GetStatus", UnaryCall::Log::kNothing);
+  if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
+    return call.Finish(access.status());
+  }
   if (const std::optional<TrackedEvent> newest = hub_.newest()) {
     *response->mutable_pose() = wire::ToProtoPose(*newest->snapshot, newest->stages.captured_ns);
     response->set_map_features(static_cast<std::uint32_t>(newest->snapshot->features.size()));

@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <random>
 
 #include "server/pipeline/busy.hpp"
@@ -41,9 +42,16 @@ absl::Status CheckName(const std::string& name) {
   return absl::OkStatus();
 }
 
+v1::Role RoleWithin(v1::Role asked, AccessRole access) {
+  if (access < AccessRole::kAnnotator) return v1::ROLE_VIEWER;
+  if (asked == v1::ROLE_UNSPECIFIED) return v1::ROLE_EXPERT;
+  return asked == v1::ROLE_WEARER && access < AccessRole::kWearer ? v1::ROLE_EXPERT : asked;
+}
+
 }  // namespace
 
-absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Timestamp now_ns) {
+absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Timestamp now_ns,
+                                           const Access& access) {
   absl::Status name = CheckName(request.display_name());
   if (!name.ok()) return name;
   if (!v1::Role_IsValid(request.role())) {
@@ -57,9 +65,11 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
   }
   Session session;
   session.display_name = request.display_name().empty() ? "guest" : request.display_name();
-  if (request.role() != v1::ROLE_UNSPECIFIED) session.role = request.role();
+  session.role = RoleWithin(request.role(), access.role);
+  session.access_id = access.id;
   const std::lock_guard lock(mutex_);
-  if (const auto known = sessions_.find(resumed); known != sessions_.end()) {
+  const auto known = sessions_.find(resumed);
+  if (known != sessions_.end() && known->second.session.access_id == access.id) {
     Slot& slot = known->second;
     session.id = slot.session.id;
     session.participant_id = slot.session.participant_id;
@@ -92,8 +102,28 @@ bool SessionTable::MakeRoom(Timestamp now_ns) {
   if (chosen == sessions_.end()) return false;
   if (chosen->second.used) gone_.push_back(chosen->second.session.participant_id);
   sessions_.erase(chosen);
-  std::erase_if(gone_, [this](const std::string& id) { return !on_gone_ || on_gone_(id); });
+  TellGone();
   return true;
+}
+
+void SessionTable::TellGone() {
+  std::erase_if(gone_, [this](const std::string& id) { return !on_gone_ || on_gone_(id); });
+}
+
+void SessionTable::End(const std::vector<std::string>& access_ids) {
+  const std::lock_guard lock(mutex_);
+  absl::erase_if(sessions_, [&](const auto& entry) {
+    const Slot& slot = entry.second;
+    const bool ends =
+        std::find(access_ids.begin(), access_ids.end(), slot.session.access_id) != access_ids.end();
+    if (ends && slot.used) gone_.push_back(slot.session.participant_id);
+    return ends;
+  });
+  TellGone();
+}
+
+absl::Status SessionTable::UnknownSession() {
+  return absl::NotFoundError("session_id: unknown to this server: call Join again");
 }
 
 absl::StatusOr<Session> SessionTable::Find(const std::string& session_id, Timestamp now_ns) {
@@ -102,7 +132,7 @@ absl::StatusOr<Session> SessionTable::Find(const std::string& session_id, Timest
   const std::lock_guard lock(mutex_);
   const auto at = sessions_.find(session_id);
   if (at == sessions_.end()) {
-    return absl::NotFoundError("session_id: unknown to this server: call Join again");
+    return UnknownSession();
   }
   at->second.used_ns = now_ns;
   at->second.used = true;

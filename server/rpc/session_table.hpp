@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "saccade/v1/session.pb.h"
+#include "server/identity/access.hpp"
 #include "shared/time/timestamp.hpp"
 
 namespace saccade {
@@ -21,6 +22,7 @@ struct Session {
   std::string participant_id;  // UUID; what others know it by
   std::string display_name;
   v1::Role role = v1::ROLE_EXPERT;
+  std::string access_id;  // of the token that joined (Access::id); no other may use the session
 };
 
 struct SessionTableOptions {
@@ -42,10 +44,13 @@ class SessionTable {
   explicit SessionTable(const SessionTableOptions& options = {}, OnGone on_gone = nullptr)
       : options_(options), on_gone_(std::move(on_gone)) {}
 
-  /// Makes a session, or goes on with `request.resume_session_id` if there is one of that id.
+  /// Makes a session, or goes on with `request.resume_session_id` if there is one of that id and
+  /// token. Its role is what was asked for, as far as `access` reaches: who may not be the wearer
+  /// is an expert, and who may only look a viewer.
   ///   InvalidArgument    names the field
   ///   ResourceExhausted  the table is full of sessions in use
-  absl::StatusOr<Session> Join(const v1::JoinRequest& request, Timestamp now_ns = MonotonicNow());
+  absl::StatusOr<Session> Join(const v1::JoinRequest& request, Timestamp now_ns = MonotonicNow(),
+                               const Access& access = {});
 
   /// NotFound: never joined, or before this server started. Counts as use.
   absl::StatusOr<Session> Find(const std::string& session_id, Timestamp now_ns = MonotonicNow());
@@ -53,6 +58,12 @@ class SessionTable {
   /// As Find; PermissionDenied for those who may only look.
   absl::StatusOr<Session> FindEditor(const std::string& session_id,
                                      Timestamp now_ns = MonotonicNow());
+
+  /// Ends every session of these tokens.
+  void End(const std::vector<std::string>& access_ids);
+
+  /// What Find answers to who names a session that is not there.
+  static absl::Status UnknownSession();
 
   /// While what is returned lives (a stream), the session stays. It must not outlive the table.
   std::shared_ptr<void> Hold(const std::string& session_id);
@@ -66,6 +77,7 @@ class SessionTable {
   };
   bool MakeRoom(Timestamp now_ns);
   void Release(const std::string& session_id);
+  void TellGone();
 
   const SessionTableOptions options_;
   const OnGone on_gone_;

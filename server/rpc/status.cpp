@@ -1,6 +1,7 @@
 #include "server/rpc/status.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
 #include <absl/time/clock.h>
 #include <absl/time/time.h>
 
@@ -78,6 +79,12 @@ bool IsWorthALine(const absl::Status& status, std::uint64_t& unsaid) {
   return false;
 }
 
+// "MapService/Get" is "Map.Get", as two services have one; of the others the method's own name.
+std::string LogName(absl::string_view method) {
+  const bool map = absl::ConsumePrefix(&method, "MapService/");
+  return absl::StrCat(map ? "Map." : "", Printable(method.substr(method.find('/') + 1)));
+}
+
 }  // namespace
 
 void Audit(const char* method, const std::string& participant_id, const absl::Status& status) {
@@ -85,7 +92,7 @@ void Audit(const char* method, const std::string& participant_id, const absl::St
   if (!IsWorthALine(status, unsaid)) return;
   const std::string time =
       absl::FormatTime("%Y-%m-%dT%H:%M:%E3SZ", absl::Now(), absl::UTCTimeZone());
-  Log(absl::StrCat(time, " rpc ", Printable(method),
+  Log(absl::StrCat(time, " rpc ", LogName(method),
                    " participant=", Printable(participant_id.substr(0, 36)), " ",
                    status.ok() ? "ok" : Printable(status.ToString()),
                    unsaid == 0 ? "" : absl::StrCat(" (and ", unsaid, " more)")));

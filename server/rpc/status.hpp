@@ -12,8 +12,9 @@ namespace saccade {
 /// (`BusyError`) carries google.rpc.RetryInfo.
 grpc::Status ToGrpc(const absl::Status& status);
 
-/// One line on stderr: time, method, participant, outcome. Never what was written in an annotation,
-/// nor the credential. Of what came too often one line a second, with their number.
+/// One line on stderr: time, method ("SessionService/Join" as "Join"), participant, outcome. Never
+/// what was written in an annotation, nor the credential. Of what came too often one line a second,
+/// with their number.
 void Audit(const char* method, const std::string& participant_id, const absl::Status& status);
 
 }  // namespace saccade

@@ -11,6 +11,8 @@ namespace {
 
 // Who came and went is told at most so often: each telling names everybody to everybody.
 constexpr Timestamp kPresenceInterval = 250'000'000;
+// So long a stream that is ended may take to say why.
+constexpr Timestamp kLastWords = 300'000'000;
 
 }  // namespace
 
@@ -76,6 +78,38 @@ void StreamHub::AbandonTheSilent(Timestamp now_ns) {
     stream->Abandon(absl::DeadlineExceededError(absl::StrCat(
         "no event was acknowledged for ", silence_ns_ / 1'000'000'000, " s: subscribe again")));
   }
+}
+
+void StreamHub::End(const std::vector<std::string>& access_ids, const absl::Status& status) {
+  std::vector<std::shared_ptr<Subscriber>> ended;
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(streams_, [&](const std::shared_ptr<Subscriber>& stream) {
+      const std::string& id = stream->session().access_id;
+      if (std::find(access_ids.begin(), access_ids.end(), id) == access_ids.end()) return false;
+      ended.push_back(stream);
+      ended_.emplace_back(stream, MonotonicNow());
+      by_session_.erase(stream->session().id);
+      return true;
+    });
+  }
+  if (ended.empty()) return;
+  StreamsChanged();
+  for (const auto& stream : ended) stream->Close(status);
+}
+
+// A write under way has a moment to end, and the word of the end to follow it.
+void StreamHub::AbandonTheEnded(Timestamp now_ns) {
+  std::vector<std::shared_ptr<Subscriber>> late;
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(ended_, [&](const auto& entry) {
+      if (now_ns - entry.second < kLastWords) return false;
+      late.push_back(entry.first);
+      return true;
+    });
+  }
+  for (const auto& stream : late) stream->Abandon(absl::CancelledError("access: ended"));
 }
 
 struct StreamHub::Round {
@@ -151,6 +185,7 @@ void StreamHub::GoRound() {
   const Round round = Prepare();
   GrantKeyFrames(MonotonicNow());                          // what had to wait
   if (round.statistics) AbandonTheSilent(MonotonicNow());  // once a second
+  AbandonTheEnded(MonotonicNow());
   const std::vector<std::shared_ptr<Subscriber>> streams = Streams();
   if (streams.empty()) return;
   // Not the same one first each time: who comes late in a round that is too long waits longest.

@@ -98,6 +98,9 @@ class StreamHub : public EventSink {
                            bool request_key_frame);
   /// A stream needs a key frame of `view`; requests are joined. Any thread.
   void AskForKeyFrame(VideoView view);
+  /// Ends the streams of these tokens (Session::access_id) now: nothing more is written to them,
+  /// and who does not even take the word of it is cut off.
+  void End(const std::vector<std::string>& access_ids, const absl::Status& status);
   /// Ends every stream and takes no more.
   void CloseAll(const absl::Status& status);
 
@@ -128,6 +131,7 @@ class StreamHub : public EventSink {
   Round Prepare();
   void GrantKeyFrames(Timestamp now_ns);
   void AbandonTheSilent(Timestamp now_ns);
+  void AbandonTheEnded(Timestamp now_ns);
   /// False: closed. `replaced` is the stream that the same session had.
   bool Insert(const std::shared_ptr<Subscriber>& subscriber, std::shared_ptr<Subscriber>& replaced);
   std::vector<std::shared_ptr<Subscriber>> Streams() const;
@@ -139,6 +143,8 @@ class StreamHub : public EventSink {
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Subscriber>> streams_;
   absl::flat_hash_map<std::string, std::shared_ptr<Subscriber>> by_session_;  // the same
+  /// Told that they end, and when.
+  std::vector<std::pair<std::shared_ptr<Subscriber>, Timestamp>> ended_;
   bool closed_ = false;
   std::optional<TrackedEvent> newest_;
   std::optional<NumberedState> numbered_;  // the newest that the hub's thread has worked out

@@ -106,7 +106,7 @@ void StreamWriter::OnDone() {
     done_ = true;
   }
   hub_.Remove(this);
-  Audit("Subscribe/end", session_.participant_id, absl::OkStatus());
+  Audit("SessionService/Subscribe/end", session_.participant_id, absl::OkStatus());
   // The hub may still hold a reference for the length of one Distribute.
   const std::shared_ptr<StreamWriter> last = std::move(self_);
 }

@@ -3,6 +3,7 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/support/server_callback.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -23,16 +24,18 @@ class UnaryCall {
   /// Which ends are worth a line in the log.
   enum class Log { kAll, kRefusals, kNothing };
 
-  /// `method` must outlive the call: a literal.
+  /// `method` as the table of roles has it, "SessionService/Join"; must outlive the call: a
+  /// literal.
   UnaryCall(Context& context, const char* method, Log log)
       : context_(&context), reactor_(context.DefaultReactor()), method_(method), log_(log) {}
 
   void set_log(Log log) { log_ = log; }
 
   // Admission (Gatekeeper); the log names whom it knows from then on.
-  absl::Status Anyone(Gatekeeper& gate, Toll toll) const { return gate.Anyone(*context_, toll); }
-  absl::StatusOr<Session> Editor(Gatekeeper& gate, Toll toll, const std::string& session_id);
-  void Is(const Session& session) { participant_id_ = session.participant_id; }
+  absl::StatusOr<Access> Enter(Gatekeeper& gate, std::optional<Toll> toll);
+  absl::StatusOr<Session> Member(Gatekeeper& gate, std::optional<Toll> toll,
+                                 const std::string& session_id);
+  void Is(const Session& session);
 
   /// For gRPC, where a `done` answers.
   Reactor* reactor() const { return reactor_; }
@@ -55,11 +58,15 @@ class UnaryCall {
   }
 
  private:
+  void NoteAccess();
+  void Keep(const absl::Status& status) const;
+
   Context* context_;  // gone once the call is finished
   Reactor* reactor_;
   const char* method_;
   Log log_;
-  std::string participant_id_;  // empty: not known
+  AccessBook* book_ = nullptr;                             // from admission on
+  std::string participant_id_, display_name_, access_id_;  // empty: not known
 };
 
 }  // namespace saccade

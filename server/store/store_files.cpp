@@ -31,7 +31,10 @@ bool HoldsOnlyTheStore(const fs::path& directory) {
     return false;
   }
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
-    if (!absl::StartsWith(it->path().filename().string(), "annotations.")) return false;
+    const std::string name = it->path().filename().string();
+    const bool ours = absl::StartsWith(name, "annotations.") || absl::StartsWith(name, "access.") ||
+                      name == "tls" || name == "owner.json";
+    if (!ours) return false;
   }
   return !error;
 }

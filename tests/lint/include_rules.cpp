@@ -15,8 +15,9 @@ using std::string_view;
 
 // Listed along the data flow: a folder includes only itself and those before it.
 constexpr auto kServerOrder = std::to_array<string_view>(
-    {"pipeline", "mount", "gl", "capture", "sim", "features", "filter", "map", "tracker", "anchors",
-     "gaze", "wearable", "overlay", "encode", "store", "rpc", "gateway", "eval", "app"});
+    {"pipeline", "mount",    "gl",      "capture", "sim",      "features", "filter",
+     "map",      "tracker",  "anchors", "gaze",    "wearable", "overlay",  "encode",
+     "store",    "identity", "rpc",     "gateway", "eval",     "app"});
 constexpr auto kClientOrder = std::to_array<string_view>({"net", "cli"});
 constexpr auto kSharedOrder =
     std::to_array<string_view>({"io", "geometry", "time", "camera", "scene", "wire", "render"});
@@ -28,7 +29,7 @@ struct Restriction {
 };
 const std::vector<Restriction>& Restrictions() {
   static const std::vector<Restriction> restrictions = {
-      {"server/rpc", {"server/rpc", "server/pipeline", "server/encode"}},
+      {"server/rpc", {"server/rpc", "server/pipeline", "server/encode", "server/identity"}},
       {"server/gateway", {"server/gateway", "server/pipeline"}},
   };
   return restrictions;
@@ -46,6 +47,8 @@ const std::vector<Home>& Homes() {
       {"grpcpp/", {"server/rpc", "server/gateway", "server/app", "client/net"}},
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},
+      {"openssl/", {"server/identity", "client/net"}},
+      {"qrencode.h", {"shared/io"}},
       {"wels/", {"server/encode"}},
       {"GL/osmesa.h", {"server/gl"}},
       {"EGL/", {"server/gl"}},

@@ -5,5 +5,5 @@ import { startPage } from './ui/start';
 
 startPage(
   { role: 'expert', view: 'raw', name: recallName(location.search, storage()) },
-  (session, player) => new App(session, player),
+  (session, player, token) => new App(session, player, token),
 );

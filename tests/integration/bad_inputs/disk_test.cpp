@@ -38,7 +38,9 @@ TEST(FullDisk, EditsAreRefusedAndWhatWasAnsweredStays) {
   ASSERT_TRUE(ready) << server.err();
   const auto at = ready->find("127.0.0.1:", ready->find("\"grpc\""));
   const std::string grpc = ready->substr(at, ready->find('"', at) - at);
-  auto connection = net::Connection::Create({.server = grpc, .session_id = ""});
+  net::ConnectionOptions options;
+  options.server = grpc;
+  auto connection = net::Connection::Create(options);
   ASSERT_TRUE(connection.ok());
 
   std::vector<std::string> answered;

@@ -107,8 +107,16 @@ TEST(BadStart, ArgumentsAreRefusedByName) {
   refuse("--source of an unknown kind", {"--source", "telepathy:1"}, 1, "telepathy");
   refuse("unknown option", {"--source", source, "--frobnicate"}, 2, "frobnicate");
   refuse("--grpc without a port", {"--source", source, "--grpc", "localhost"}, 2, "grpc");
-  refuse("another address without --insecure", {"--source", source, "--grpc", "0.0.0.0:0"}, 2,
-         "--insecure");
+  refuse("--tls-certificate without its key", {"--source", source, "--tls-certificate", "a.pem"}, 2,
+         "--tls-key");
+  refuse("--tls-certificate that is not there",
+         {"--source", source, "--tls-certificate", folder / "a.pem", "--tls-key", folder / "a.key"},
+         1, "a.pem");
+  WriteText(folder / "no.pem", "no certificate");
+  refuse(
+      "--tls-certificate that is none",
+      {"--source", source, "--tls-certificate", folder / "no.pem", "--tls-key", folder / "no.pem"},
+      1, "no.pem");
   WriteText(folder / "broken.toml", "this is = = not TOML");
   refuse("--config that is not TOML", {"--source", source, "--config", folder / "broken.toml"}, 2,
          "broken.toml");

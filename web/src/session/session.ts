@@ -18,16 +18,8 @@ import { FrameRing } from './ring';
 import { silenceWords } from './silence';
 import { sleep } from './sleep';
 import type { Tabs } from './tabs';
-import {
-  type FrameFacts,
-  isPlaced,
-  type Link,
-  type Participant,
-  type Pose,
-  type Role,
-  type Scale,
-} from './types';
-import type { Statistics, View } from './types';
+import { isPlaced } from './types';
+import type { FrameFacts, Link, Participant, Pose, Role, Scale, Statistics, View } from './types';
 
 /** Where coded pictures go. */
 export interface PictureSink {
@@ -46,6 +38,8 @@ export interface SessionOptions {
   readonly kept?: KeptSession;
   /** The other tabs of this browser, where they can be asked. */
   readonly tabs?: Tabs;
+  /** Before joining: redeems an invite. Rejects if it lets nobody in. */
+  readonly enter?: (signal: AbortSignal) => Promise<void>;
 }
 
 const WINDOW = 32;
@@ -185,6 +179,7 @@ export class Session {
   private async runOnce(attempt: AbortController): Promise<void> {
     const { signal } = attempt;
     const { view } = this.options;
+    await this.options.enter?.(signal);
     const joined = await this.joining.join(
       signal,
       (tabs) => (this.link = { kind: 'crowded', tabs }),

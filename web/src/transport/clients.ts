@@ -1,5 +1,6 @@
 import { type Client, createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
+import { bearing } from './access';
 import { AnnotationService } from '../gen/saccade/v1/annotation_pb';
 import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
@@ -12,9 +13,10 @@ export interface Clients {
   readonly gaze: Client<typeof GazeService>;
 }
 
-/** gRPC-Web to the server that this page came from. */
-export function createClients(baseUrl: string): Clients {
-  const transport = createGrpcWebTransport({ baseUrl, useBinaryFormat: true });
+/** gRPC-Web to the server that this page came from; `token` goes with each call, if there is one. */
+export function createClients(baseUrl: string, token: () => string = () => ''): Clients {
+  const interceptors = [bearing(token)];
+  const transport = createGrpcWebTransport({ baseUrl, useBinaryFormat: true, interceptors });
   return {
     session: createClient(SessionService, transport),
     annotations: createClient(AnnotationService, transport),

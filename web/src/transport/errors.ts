@@ -33,7 +33,7 @@ export function streamEndWords(error: unknown): string {
 /** True where the request itself was refused: trying again cannot help. */
 export function isRefusal(error: unknown): boolean {
   const { code } = ConnectError.from(error);
-  return code === Code.InvalidArgument || code === Code.PermissionDenied;
+  return [Code.InvalidArgument, Code.PermissionDenied, Code.Unauthenticated].includes(code);
 }
 
 /** True where another stream of the same session has taken this one's place. */

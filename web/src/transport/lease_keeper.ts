@@ -1,7 +1,12 @@
 import type { LeaseTold } from './lease_loop';
 
 export type ToKeeper =
-  | { readonly kind: 'begin'; readonly baseUrl: string; readonly sessionId: string }
+  | {
+      readonly kind: 'begin';
+      readonly baseUrl: string;
+      readonly sessionId: string;
+      readonly token: string; // empty: none
+    }
   | { readonly kind: 'alive' }
   | { readonly kind: 'end' };
 export type FromKeeper =
@@ -24,7 +29,10 @@ export interface LeaseKeeping {
 export class WorkerKeeping implements LeaseKeeping {
   private spare: Worker | undefined; // a worker takes its time to start, the server waits 500 ms
 
-  constructor(private readonly baseUrl: string) {}
+  constructor(
+    private readonly baseUrl: string,
+    private readonly token: () => string,
+  ) {}
 
   warm(): void {
     this.spare ??= new Worker(new URL('./lease_worker.ts', import.meta.url), { type: 'module' });
@@ -45,7 +53,7 @@ export class WorkerKeeping implements LeaseKeeping {
         told(message.told);
       }
     };
-    send({ kind: 'begin', baseUrl: this.baseUrl, sessionId });
+    send({ kind: 'begin', baseUrl: this.baseUrl, sessionId, token: this.token() });
     // This page's own timers stop when it hangs: then the heartbeats stop as well.
     const alive = setInterval(() => send({ kind: 'alive' }), 300);
     return {

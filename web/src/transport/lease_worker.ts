@@ -1,6 +1,7 @@
 import { createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { GazeService } from '../gen/saccade/v1/gaze_pb';
+import { bearing } from './access';
 import type { FromKeeper, ToKeeper } from './lease_keeper';
 import { HEARTBEAT_MS, LeaseLoop } from './lease_loop';
 
@@ -12,8 +13,9 @@ const post = (message: FromKeeper): void => self.postMessage(message);
 let loop: LeaseLoop | undefined;
 let ending = false;
 
-function begin(baseUrl: string, sessionId: string): void {
-  const client = createClient(GazeService, createGrpcWebTransport({ baseUrl }));
+function begin(baseUrl: string, sessionId: string, token: string): void {
+  const interceptors = [bearing(() => token)];
+  const client = createClient(GazeService, createGrpcWebTransport({ baseUrl, interceptors }));
   loop = new LeaseLoop(
     (session, lease) =>
       client.acquireLease({ sessionId: session, leaseId: lease }, { timeoutMs: 2000 }),
@@ -31,7 +33,7 @@ function begin(baseUrl: string, sessionId: string): void {
 self.addEventListener('message', ({ data: message }: MessageEvent<ToKeeper>) => {
   switch (message.kind) {
     case 'begin':
-      begin(message.baseUrl, message.sessionId);
+      begin(message.baseUrl, message.sessionId, message.token);
       break;
     case 'alive':
       loop?.alive(performance.now());

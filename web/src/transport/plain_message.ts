@@ -1,5 +1,17 @@
 /** What the server says to a program, and what a person is told: who looks at a page knows no fields. */
 const SAYINGS: readonly (readonly [RegExp, string])[] = [
+  [
+    /^access: this server lets in who has an invite.*/,
+    'you need an invite: ask for a link, and open it',
+  ],
+  [
+    /^access: this invite is not known here.*/,
+    'this server does not know this invite: was the whole link copied? Else ask for a new one',
+  ],
+  [
+    /^access: this takes the role (\w+), and yours is (\w+).*/,
+    'your invite is for a $2, and this takes the role $1: ask for another invite',
+  ],
   [/^session_id: unknown/, 'the server no longer knows this session; the page begins a new one'],
   [/^session_id: this session has no stream/, 'this page is not connected now'],
   [/^session_id: a viewer changes nothing.*/, 'viewers change nothing'],

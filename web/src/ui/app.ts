@@ -49,11 +49,12 @@ export class App {
   constructor(
     private readonly session: Session,
     private readonly player: Player,
+    token: () => string,
   ) {
     const { state } = this;
     this.map = new MapPane(session, player, state);
     this.video = new VideoPane(session, player, state);
-    this.pilot = new GazePilot(session, new WorkerKeeping(location.origin));
+    this.pilot = new GazePilot(session, new WorkerKeeping(location.origin, token));
     const gaze = new GazeController(session, this.pilot, state);
     const edits = new Edits(session);
     const notes = new Notes(session, edits, state);

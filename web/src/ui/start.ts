@@ -3,8 +3,9 @@ import { newUuid } from '../session/edits';
 import { KeptSession } from '../session/kept_session';
 import { Session, type SessionOptions } from '../session/session';
 import { Tabs } from '../session/tabs';
+import { Access, inviteOf } from '../transport/access';
 import { createClients } from '../transport/clients';
-import { letGoOfButtons, tabStorage } from './dom';
+import { h, letGoOfButtons, storage, tabStorage } from './dom';
 import { Player } from './player';
 
 /** What a page shows of a session. */
@@ -16,15 +17,20 @@ interface Page {
 /** Joins the server that this page came from, and shows what it tells until the page is left. */
 export function startPage(
   options: Pick<SessionOptions, 'role' | 'view' | 'name'>,
-  makePage: (session: Session, player: Player) => Page,
+  makePage: (session: Session, player: Player, token: () => string) => Page,
 ): void {
+  const access = new Access(location.origin, takeInvite(), tabStorage(), storage());
+  const token = (): string => access.token;
+  const enter = (signal: AbortSignal): Promise<void> => access.enter(signal);
   const player = new Player();
   const kept = new KeptSession(tabStorage(), options.role, !reloaded());
   const tabs = new Tabs(new BroadcastChannel('saccade'), newUuid(), openedMs(tabStorage()));
-  const session = new Session(createClients(location.origin), { ...options, kept, tabs }, player);
+  const clients = createClients(location.origin, token);
+  const session = new Session(clients, { ...options, kept, tabs, enter }, player);
   player.attach(session);
-  const page = makePage(session, player);
+  const page = makePage(session, player, token);
   document.body.append(page.element);
+  void warnOfInsecure(access);
   page.start();
   const leaving = new AbortController();
   window.addEventListener('pagehide', () => {
@@ -32,11 +38,31 @@ export function startPage(
     tabs.leave();
   });
   letGoOfButtons();
+  // Another invite in the address of a page that is open already.
+  window.addEventListener('hashchange', () => {
+    if (inviteOf(location.hash) !== undefined) location.reload();
+  });
   // Back from the browser's page cache: the session was left, so begin again.
   window.addEventListener('pageshow', (event) => {
     if (event.persisted) location.reload();
   });
   void session.run(leaving.signal);
+}
+
+/** The invite of this link; it is gone from the address then, so that nobody copies it from there. */
+function takeInvite(): string | undefined {
+  const invite = inviteOf(location.hash);
+  if (invite !== undefined)
+    history.replaceState(history.state, '', location.pathname + location.search);
+  return invite;
+}
+
+async function warnOfInsecure(access: Access): Promise<void> {
+  const told = await access.client.getAccess({}, { timeoutMs: 5000 }).catch(() => undefined);
+  if (!told?.insecure) return;
+  const words =
+    'Insecure: started for laboratories, without TLS. Whoever is on this network sees and changes everything.';
+  document.body.append(h('p', { class: 'insecure', role: 'alert' }, words));
 }
 
 const OPENED = 'saccade.opened';

@@ -21,21 +21,25 @@ const FLAGS = [
  * Root's Chromium puts its software GPU above every other process, as no person's can: on two cores the
  * server got 5 to 9 pictures a second. Here it may not.
  */
-function withoutPriority(executablePath, folder) {
-  const without = ['--bounding-set', '-sys_nice'];
-  if (spawnSync('setpriv', [...without, 'true']).status !== 0) return executablePath; // not root
+function withoutPriority(executablePath, folder, prefix) {
+  const without = ['setpriv', '--bounding-set', '-sys_nice'];
+  const root = spawnSync(without[0], [...without.slice(1), 'true']).status === 0;
+  if (!root && prefix.length === 0) return executablePath;
   const script = join(folder, 'chromium');
-  const line = `exec setpriv ${without.join(' ')} '${executablePath}' "$@"`;
+  const words = [...prefix, ...(root ? without : [])];
+  const line = `exec ${words.join(' ')} '${executablePath}' "$@"`;
   writeFileSync(script, `#!/bin/sh\n${line}\n`, { mode: 0o755 });
   return script;
 }
 
 export class Expert {
-  static async open(executablePath, url) {
+  /** `home`: whose certificates count; `prefix`: a command that runs the browser elsewhere. */
+  static async open(executablePath, url, { home = process.env['HOME'], prefix = [] } = {}) {
     const profile = mkdtempSync(join(tmpdir(), 'saccade-browser-'));
     const context = await chromium.launchPersistentContext(profile, {
-      executablePath: withoutPriority(executablePath, profile),
+      executablePath: withoutPriority(executablePath, profile, prefix),
       args: FLAGS,
+      env: { ...process.env, HOME: home },
       viewport: { width: 1280, height: 720 },
     });
     const page = context.pages()[0] ?? (await context.newPage());

@@ -1,7 +1,8 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze|dots|person]   (gaze: the turning of the head; dots: measured features while the
-//        wearer turns; person: typing, keys, tabs, a reload; page: everything else)
+//        [--part page|gaze|dots|person|invite]   (gaze: the turning of the head; dots: measured features
+//        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
+//        from another address than loopback where this may make a network namespace; page: everything else)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -39,6 +40,7 @@ const PARTS = {
   gaze: async () => (await import('./gaze.mjs')).runGaze,
   dots: async () => (await import('./dots.mjs')).runDots,
   person: async () => (await import('./person.mjs')).runPerson,
+  invite: async () => (await import('./invite.mjs')).runInvite,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);
 const runChecks = await PARTS[options.part]();

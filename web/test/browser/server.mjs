@@ -5,9 +5,10 @@ import { join } from 'node:path';
 import { promisify } from 'node:util';
 import { decodePng } from './pictures.mjs';
 
-/** Starts a server; resolves when it serves. `http` is its page's address. */
-export async function startServer(binary, args) {
-  const child = spawn(binary, args, { stdio: ['ignore', 'pipe', 'pipe'] });
+/** Starts a server; resolves when it serves. `http` is its page's address, `address` that without scheme. */
+export async function startServer(binary, args, prefix = []) {
+  const [command, ...rest] = [...prefix, binary, ...args];
+  const child = spawn(command, rest, { stdio: ['ignore', 'pipe', 'pipe'] });
   let errors = '';
   child.stderr.on('data', (data) => {
     errors = (errors + data).slice(-4000);
@@ -25,6 +26,7 @@ export async function startServer(binary, args) {
   });
   return {
     http: `http://${ready.http}`,
+    address: ready.http,
     /** Ends it as a person would, then by force; returns how long it took [ms]. */
     async stop() {
       const begin = performance.now();

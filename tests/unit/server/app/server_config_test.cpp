@@ -91,11 +91,53 @@ TEST(ServerConfig, BadUsageNamesTheFlagAndTheRemedy) {
   EXPECT_THAT(Error({"--source", "dataset:/x", "--sim-truth", "t"}), HasSubstr("--sim-truth"));
 }
 
-TEST(ServerConfig, BeyondThisMachineOnlyWithInsecure) {
-  EXPECT_THAT(Error({"--source", "sim:desk", "--http", "0.0.0.0:8080"}), HasSubstr("--insecure"));
-  EXPECT_THAT(Error({"--source", "sim:desk", "--grpc", "[::]:1"}), HasSubstr("--insecure"));
-  EXPECT_EQ(Good({"--source", "sim:desk", "--http", "0.0.0.0:1", "--insecure"}).http.host,
-            "0.0.0.0");
+TEST(ServerConfig, BeyondThisMachineThereIsTlsAndInvitesUnlessInsecure) {
+  const ServerConfig loopback = Good({"--source", "sim:desk"});
+  EXPECT_FALSE(loopback.WantsTls(loopback.grpc) || loopback.WantsTls(loopback.http));
+  EXPECT_FALSE(loopback.auth_required);
+  for (const char* flag : {"--http", "--grpc"}) {
+    const ServerConfig outside = Good({"--source", "sim:desk", flag, "0.0.0.0:1"});
+    EXPECT_EQ(outside.WantsTls(outside.http), flag == std::string("--http"));
+    EXPECT_EQ(outside.WantsTls(outside.grpc), flag == std::string("--grpc"));
+    EXPECT_TRUE(outside.auth_required) << "on both ports: the other one is no back door";
+  }
+  EXPECT_TRUE(Good({"--source", "sim:desk", "--grpc", "[::]:1"}).auth_required);
+  const ServerConfig lab = Good({"--source", "sim:desk", "--http", "0.0.0.0:1", "--insecure"});
+  EXPECT_FALSE(lab.WantsTls(lab.http));
+  EXPECT_FALSE(lab.auth_required);
+}
+
+TEST(ServerConfig, LoopbackHasTlsAndInvitesWhereAskedFor) {
+  const std::string file =
+      Toml("source = \"sim:desk\"\n[tls]\nrequired = true\n[auth]\nrequired = true\n");
+  const ServerConfig config = Good({"--config", file});
+  EXPECT_TRUE(config.WantsTls(config.grpc) && config.WantsTls(config.http));
+  EXPECT_TRUE(config.auth_required);
+  EXPECT_THAT(Error({"--config", file, "--insecure"}), HasSubstr("--insecure"));
+  EXPECT_THAT(Error({"--config", Toml("[tls]\nrequires = true\n")}), HasSubstr("tls.requires"));
+}
+
+TEST(ServerConfig, ACertificateComesWithItsKey) {
+  EXPECT_THAT(Error({"--source", "sim:desk", "--tls-certificate", "a.pem"}),
+              HasSubstr("--tls-key"));
+  EXPECT_THAT(Error({"--source", "sim:desk", "--tls-key", "a.key"}),
+              HasSubstr("--tls-certificate"));
+  const ServerConfig given =
+      Good({"--source", "sim:desk", "--tls-certificate", "a.pem", "--tls-key", "a.key"});
+  EXPECT_TRUE(given.WantsTls(given.http)) << "who gives one means it, on loopback, too";
+  const ServerConfig file =
+      Good({"--config", Toml("source = \"sim:desk\"\n[tls]\ncertificate = \"c\"\nkey = \"k\"\n")});
+  EXPECT_EQ(file.tls_certificate, "c");
+  EXPECT_EQ(file.tls_key, "k");
+}
+
+TEST(ServerConfig, ThePublicUrlIsAnOrigin) {
+  EXPECT_EQ(Good({"--source", "sim:desk", "--public-url", "https://a.example/"}).public_url,
+            "https://a.example");
+  for (const char* bad :
+       {"a.example", "https://", "https://a.example/path", "https://u@a.example"}) {
+    EXPECT_THAT(Error({"--source", "sim:desk", "--public-url", bad}), HasSubstr("--public-url"));
+  }
 }
 
 TEST(ServerConfig, TheFileIsReadAndFlagsWin) {
@@ -119,7 +161,8 @@ TEST(ServerConfig, ThePrintedFileSaysEverythingAndChangesNothing) {
   EXPECT_FALSE(printed->has_value());
   for (const char* words :
        {"mount = \"none\"", "grpc = \"127.0.0.1:50051\"", "[video]", "[limits]", "[tracker]",
-        "pixel_sigma_px = 0.5", "[gaze]", "[mount_model.pan]", "[dynamixel]", "[v4l2]"}) {
+        "[tls]", "certificate = \"\"", "[auth]", "required = false", "pixel_sigma_px = 0.5",
+        "[gaze]", "[mount_model.pan]", "[dynamixel]", "[v4l2]"}) {
     EXPECT_THAT(text, HasSubstr(words));
   }
   const std::string file = Toml(text);

@@ -45,7 +45,11 @@ class Client : public Subscriber {
  public:
   Client(const std::string& id, const SubscriptionOptions& options, StreamHub& hub,
          std::chrono::microseconds cost)
-      : Subscriber({.id = id, .participant_id = id, .display_name = id, .role = v1::ROLE_VIEWER},
+      : Subscriber({.id = id,
+                    .participant_id = id,
+                    .display_name = id,
+                    .role = v1::ROLE_VIEWER,
+                    .access_id = "token of " + id},
                    options, hub.bytes()),
         hub_(hub),
         cost_(cost) {}

@@ -1,0 +1,128 @@
+#include "client/net/access_client.hpp"
+
+#include <grpcpp/grpcpp.h>
+
+#include <array>
+#include <chrono>
+#include <utility>
+
+#include "client/net/channel.hpp"
+#include "saccade/v1/access.grpc.pb.h"
+
+namespace saccade::net {
+namespace {
+
+constexpr std::array<std::pair<v1::AccessRole, const char*>, 5> kRoles = {
+    {{v1::ACCESS_ROLE_VIEWER, "viewer"},
+     {v1::ACCESS_ROLE_ANNOTATOR, "annotator"},
+     {v1::ACCESS_ROLE_PILOT, "pilot"},
+     {v1::ACCESS_ROLE_WEARER, "wearer"},
+     {v1::ACCESS_ROLE_OWNER, "owner"}}};
+
+std::string WordOf(v1::AccessRole role) {
+  for (const auto& [known, word] : kRoles) {
+    if (known == role) return word;
+  }
+  return "unknown";
+}
+
+v1::AccessRole RoleOf(const std::string& word) {
+  for (const auto& [known, name] : kRoles) {
+    if (name == word) return known;
+  }
+  return v1::ACCESS_ROLE_UNSPECIFIED;
+}
+
+Invite FromProto(const v1::Invite& message) {
+  return {message.id(),
+          WordOf(message.role()),
+          message.label(),
+          message.created_unix_s(),
+          message.expires_unix_s(),
+          message.uses(),
+          message.used(),
+          message.revoked()};
+}
+
+}  // namespace
+
+class AccessClient::Impl {
+ public:
+  explicit Impl(const ConnectionOptions& options)
+      : options_(options), stub_(v1::AccessService::NewStub(MakeChannel(options))) {}
+
+  template <typename Request, typename Response>
+  absl::StatusOr<Response> Call(grpc::Status (v1::AccessService::Stub::*method)(
+                                    grpc::ClientContext*, const Request&, Response*),
+                                const Request& request) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + options_.deadline);
+    Authorise(options_, context);
+    Response response;
+    const grpc::Status status = ((*stub_).*method)(&context, request, &response);
+    if (!status.ok()) return Explain(options_, status);
+    return response;
+  }
+
+ private:
+  const ConnectionOptions options_;
+  const std::unique_ptr<v1::AccessService::Stub> stub_;
+};
+
+AccessClient::AccessClient(const ConnectionOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
+AccessClient::~AccessClient() = default;
+
+absl::StatusOr<Pass> AccessClient::Redeem(const std::string& invite) {
+  static const std::string kMark = "#invite=";
+  v1::RedeemRequest request;
+  const std::size_t at = invite.find(kMark);
+  request.set_invite(at == std::string::npos ? invite : invite.substr(at + kMark.size()));
+  const auto response = impl_->Call(&v1::AccessService::Stub::Redeem, request);
+  if (!response.ok()) return response.status();
+  return Pass{response->token(), WordOf(response->role()), response->expires_unix_s()};
+}
+
+absl::StatusOr<NewInvite> AccessClient::Create(const std::string& role, std::uint32_t life_s,
+                                               std::uint32_t uses, const std::string& label) {
+  v1::CreateInviteRequest request;
+  request.set_role(RoleOf(role));
+  request.set_life_s(life_s);
+  request.set_uses(uses);
+  request.set_label(label);
+  const auto response = impl_->Call(&v1::AccessService::Stub::CreateInvite, request);
+  if (!response.ok()) return response.status();
+  return NewInvite{FromProto(response->invite()), response->link()};
+}
+
+absl::StatusOr<std::vector<Invite>> AccessClient::List() {
+  const auto response =
+      impl_->Call(&v1::AccessService::Stub::ListInvites, v1::ListInvitesRequest());
+  if (!response.ok()) return response.status();
+  std::vector<Invite> all;
+  for (const v1::Invite& invite : response->invites()) all.push_back(FromProto(invite));
+  return all;
+}
+
+absl::StatusOr<int> AccessClient::Revoke(const std::string& id) {
+  v1::RevokeInviteRequest request;
+  request.set_id(id);
+  const auto response = impl_->Call(&v1::AccessService::Stub::RevokeInvite, request);
+  if (!response.ok()) return response.status();
+  return static_cast<int>(response->passes());
+}
+
+absl::StatusOr<std::vector<AuditEntry>> AccessClient::Audit(std::uint32_t most) {
+  v1::ListAuditRequest request;
+  request.set_most(most);
+  const auto response = impl_->Call(&v1::AccessService::Stub::ListAudit, request);
+  if (!response.ok()) return response.status();
+  std::vector<AuditEntry> all;
+  for (const v1::AuditEntry& entry : response->entries()) {
+    all.push_back({entry.unix_ms(), entry.participant_id(), entry.display_name(), entry.invite_id(),
+                   entry.call(), entry.outcome()});
+  }
+  return all;
+}
+
+}  // namespace saccade::net

@@ -1,0 +1,169 @@
+#include "server/app/front_door.hpp"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <future>
+#include <nlohmann/json.hpp>
+
+#include "server/store/store_files.hpp"
+#include "shared/io/log.hpp"
+#include "shared/io/private_file.hpp"
+#include "shared/io/qr_code.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr std::chrono::seconds kPatience(5);  // of a disk, for one invite
+constexpr std::int64_t kConsoleLife_s = 8 * 3600;
+
+std::int64_t NowUnix_s() {
+  return std::chrono::duration_cast<std::chrono::seconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+bool IsEveryAddress(const std::string& host) { return host == "0.0.0.0" || host == "::"; }
+
+// Where this machine reaches a server that listens there.
+std::string LocalAddress(Address address, int port) {
+  if (address.host == "0.0.0.0") address.host = "127.0.0.1";
+  if (address.host == "::") address.host = "::1";
+  return address.ToString(port);
+}
+
+// How others reach it: the first address that is not loopback, IPv4 if there is one.
+std::string OutsideHost(const std::string& host) {
+  if (!IsEveryAddress(host)) return host;
+  std::string found = "127.0.0.1";
+  for (const std::string& address : ServerNames::OfThisMachine().addresses) {
+    const bool v6 = absl::StrContains(address, ':');
+    if (absl::StartsWith(address, "127.") || address == "::1" || (v6 && host == "0.0.0.0")) {
+      continue;
+    }
+    if (!v6) return address;
+    if (found == "127.0.0.1") found = address;
+  }
+  return found;
+}
+
+// "https://name:port" without the rest.
+std::string HostOfUrl(absl::string_view url) {
+  if (!absl::ConsumePrefix(&url, "https://")) absl::ConsumePrefix(&url, "http://");
+  const std::size_t port = url.find(':', url.rfind(']') == url.npos ? 0 : url.rfind(']'));
+  return std::string(url.substr(0, port));
+}
+
+absl::StatusOr<Issued> CreateNow(AccessBook& book, const InviteDraft& draft) {
+  const auto made = std::make_shared<std::promise<absl::StatusOr<Issued>>>();
+  std::future<absl::StatusOr<Issued>> answer = made->get_future();
+  book.CreateInvite(draft,
+                    [made](absl::StatusOr<Issued> issued) { made->set_value(std::move(issued)); });
+  if (answer.wait_for(kPatience) != std::future_status::ready) {
+    return absl::DeadlineExceededError("the disk does not answer");
+  }
+  return answer.get();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<FrontDoor>> FrontDoor::Open(const ServerConfig& config) {
+  std::unique_ptr<FrontDoor> door(new FrontDoor(config));
+  if (config.WantsTls(config.grpc) || config.WantsTls(config.http)) {
+    absl::StatusOr<ServerIdentity> identity =
+        config.tls_certificate.empty()
+            ? EnsureServerIdentity(config.data_dir, ServerNames::OfThisMachine(), NowUnix_s())
+            : LoadServerIdentity(config.tls_certificate, config.tls_key, NowUnix_s());
+    if (!identity.ok()) return identity.status();
+    const absl::StatusOr<CertificateFacts> facts = InspectCertificate(identity->chain_pem);
+    if (facts.ok()) door->allowed_hosts_ = facts->names.dns;
+    door->identity_ = *std::move(identity);
+  }
+  if (!config.public_url.empty()) door->allowed_hosts_.push_back(HostOfUrl(config.public_url));
+  AccessBook::Options options;
+  options.token_required = config.auth_required;
+  if (config.auth_required) {
+    absl::StatusOr<std::unique_ptr<AccessBook>> book = AccessBook::Open(config.data_dir, options);
+    if (!book.ok()) return book.status();
+    door->access_ = *std::move(book);
+  } else {
+    door->access_ = AccessBook::InMemory(options);
+    // Of a run that was killed: it would tell `saccade` of a server that is no more.
+    ::unlink((config.data_dir / "owner.json").c_str());
+  }
+  return door;
+}
+
+FrontDoor::~FrontDoor() {
+  if (wrote_owner_) ::unlink((config_.data_dir / "owner.json").c_str());
+}
+
+std::optional<ServerIdentity> FrontDoor::TlsOf(const Address& address) const {
+  return config_.WantsTls(address) ? identity_ : std::nullopt;
+}
+
+bool FrontDoor::insecure() const { return config_.insecure && config_.beyond_loopback(); }
+
+std::string FrontDoor::BaseUrl(int http_port) const {
+  if (!config_.public_url.empty()) return config_.public_url;
+  Address outside = config_.http;
+  outside.host = OutsideHost(outside.host);
+  return absl::StrCat(config_.WantsTls(config_.http) ? "https://" : "http://",
+                      outside.ToString(http_port));
+}
+
+std::string FrontDoor::LinkOf(AccessRole role, const std::string& token) const {
+  return absl::StrCat(base_url_, role == AccessRole::kWearer ? "/wearer" : "/", "#invite=", token);
+}
+
+absl::Status FrontDoor::Announce(int grpc_port, int http_port) {
+  base_url_ = BaseUrl(http_port);
+  if (insecure()) {
+    Log("saccade-server: INSECURE: other machines reach this server without TLS; whoever is on the "
+        "network sees and changes everything");
+  }
+  if (!config_.auth_required) return absl::OkStatus();
+  const nlohmann::json owner = {{"grpc", LocalAddress(config_.grpc, grpc_port)},
+                                {"tls", config_.WantsTls(config_.grpc)},
+                                {"root", identity_ ? identity_->root_pem : ""},
+                                {"token", access_->owner_token()}};
+  const std::filesystem::path file = config_.data_dir / "owner.json";
+  if (const int failed = WritePrivateFile(file, owner.dump() + "\n"); failed != 0) {
+    return StoreFileError(file, failed);
+  }
+  wrote_owner_ = true;
+  SayInvites();
+  return absl::OkStatus();
+}
+
+void FrontDoor::SayInvites() {
+  if (identity_ && !identity_->root_pem.empty()) {
+    Log(absl::StrCat("tls: whoever connects has to trust this server's authority once: ", base_url_,
+                     "/trust, fingerprint ", identity_->root_sha256));
+  }
+  Log(absl::StrCat("invites: `saccade invite --role pilot --data-dir ", config_.data_dir.string(),
+                   "` makes a link"));
+  if (::isatty(STDERR_FILENO) == 0) return;
+  const InviteDraft pilot{AccessRole::kPilot, kConsoleLife_s, 1, "console"};
+  const InviteDraft wearer{AccessRole::kWearer, kConsoleLife_s, 1, "console"};
+  const absl::StatusOr<Issued> expert = CreateNow(*access_, pilot);
+  const absl::StatusOr<Issued> phone = CreateNow(*access_, wearer);
+  if (!expert.ok() || !phone.ok()) {
+    const absl::Status& why = expert.ok() ? phone.status() : expert.status();
+    return Log(absl::StrCat("invites: none could be made: ", why.message()));
+  }
+  const std::string link = LinkOf(AccessRole::kWearer, phone->token);
+  FlushLog(std::chrono::milliseconds(500));
+  // Not Log: a QR code needs its colours.
+  std::string text =
+      absl::StrCat("\n  Expert (once, 8 h)  ", LinkOf(AccessRole::kPilot, expert->token),
+                   "\n  Wearer (once, 8 h)  ", link, "\n\n");
+  for (const std::string& line : QrCodeLines(link)) absl::StrAppend(&text, "  ", line, "\n");
+  (void)!::write(STDERR_FILENO, text.data(), text.size());
+}
+
+}  // namespace saccade

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/app/server_config.hpp"
+#include "server/identity/access_book.hpp"
+#include "server/identity/certificate_files.hpp"
+
+namespace saccade {
+
+/// Who the server is, and whom it lets in: what both ports share.
+///
+/// DATA_DIR/owner.json (0600) tells `saccade invite` of this user where the server is and with what
+/// token it obeys; it is there while the server runs and tokens are asked for.
+class FrontDoor {
+ public:
+  /// Makes certificates and opens the book of invites where they are wanted. Errors as
+  /// EnsureServerIdentity, LoadServerIdentity and AccessBook::Open.
+  static absl::StatusOr<std::unique_ptr<FrontDoor>> Open(const ServerConfig& config);
+  ~FrontDoor();
+
+  /// Nothing: `address` speaks plain.
+  std::optional<ServerIdentity> TlsOf(const Address& address) const;
+  AccessBook& access() { return *access_; }
+  bool insecure() const;  // plain beyond loopback
+  /// Names that browsers may use besides the machine's own.
+  const std::vector<std::string>& allowed_hosts() const { return allowed_hosts_; }
+
+  /// Any thread, once the ports are known.
+  std::string LinkOf(AccessRole role, const std::string& token) const;
+  /// Writes owner.json and says on the console how people come in: on a terminal with links and a
+  /// QR code; elsewhere, as logs are read by many, only how to make them.
+  absl::Status Announce(int grpc_port, int http_port);
+
+ private:
+  explicit FrontDoor(const ServerConfig& config) : config_(config) {}
+  std::string BaseUrl(int http_port) const;
+  void SayInvites();
+
+  const ServerConfig config_;
+  std::optional<ServerIdentity> identity_;
+  std::unique_ptr<AccessBook> access_;
+  std::vector<std::string> allowed_hosts_;
+  std::string base_url_;  // before the first call is served
+  bool wrote_owner_ = false;
+};
+
+}  // namespace saccade

@@ -1,0 +1,69 @@
+#include "server/identity/role_table.hpp"
+
+#include <array>
+
+namespace saccade {
+namespace {
+
+using enum AccessRole;
+
+constexpr auto kTable = std::to_array<RoleRow>({
+    {"AccessService/GetAccess", kAnyone},  // says whether one needs a token
+    {"AccessService/Redeem", kAnyone},     // an invite is its own admission
+    {"AccessService/CreateInvite", kOwner},
+    {"AccessService/ListInvites", kOwner},
+    {"AccessService/RevokeInvite", kOwner},
+    {"AccessService/ListAudit", kOwner},
+
+    {"SessionService/Join", kViewer},
+    {"SessionService/Subscribe", kViewer},
+    {"SessionService/Acknowledge", kViewer},
+    {"SessionService/Ping", kViewer},
+    {"SessionService/GetFrame", kViewer},
+    {"SessionService/GetStatus", kViewer},
+
+    {"AnnotationService/List", kViewer},
+    {"AnnotationService/Create", kAnnotator},
+    {"AnnotationService/Update", kAnnotator},
+    {"AnnotationService/Delete", kAnnotator},
+    {"AnnotationService/Undo", kAnnotator},
+    {"AnnotationService/Redo", kAnnotator},
+
+    {"MapService/Get", kViewer},
+    {"MapService/Export", kViewer},
+    {"MapService/List", kViewer},
+    {"MapService/Reset", kPilot},  // everybody's marks lose their place
+    {"MapService/Save", kPilot},
+    {"MapService/Load", kPilot},
+
+    {"GazeService/GetState", kViewer},
+    {"GazeService/GetMountCalibration", kViewer},
+    {"GazeService/AcquireLease", kPilot},
+    {"GazeService/ReleaseLease", kPilot},
+    {"GazeService/Fixate", kPilot},
+    {"GazeService/StopFixating", kPilot},
+    {"GazeService/Home", kPilot},
+    {"GazeService/KeepHorizon", kPilot},
+    {"GazeService/Explore", kPilot},
+    {"GazeService/CalibrateMount", kPilot},
+    {"GazeService/Override", kWearer},
+    {"GazeService/Pause", kWearer},
+
+    // The gateway. The page's files hold nothing of the wearable; what it shows comes by the calls
+    // above.
+    {"GET /", kAnyone},
+    {"GET /trust", kAnyone},
+});
+
+}  // namespace
+
+absl::Span<const RoleRow> RoleTable() { return kTable; }
+
+std::optional<AccessRole> LeastRole(absl::string_view what) {
+  for (const RoleRow& row : kTable) {
+    if (row.what == what) return row.least;
+  }
+  return std::nullopt;
+}
+
+}  // namespace saccade

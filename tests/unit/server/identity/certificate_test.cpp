@@ -1,0 +1,111 @@
+#include "server/identity/certificate.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+
+#include "server/identity/certificate_files.hpp"
+#include "tests/unit/server/identity/temporary_folder.hpp"
+
+namespace saccade {
+namespace {
+
+using saccade::testing::TemporaryFolder;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+constexpr std::int64_t kDay_s = 86'400;
+const std::int64_t kNow = std::chrono::duration_cast<std::chrono::seconds>(
+                              std::chrono::system_clock::now().time_since_epoch())
+                              .count();
+const ServerNames kNames{{"localhost", "box"}, {"127.0.0.1", "::1", "10.1.2.3"}};
+
+TEST(Certificate, OfTheAuthorityNamesTheServerAndHoldsThirteenMonths) {
+  const auto authority = MakeAuthority("Saccade on box");
+  ASSERT_TRUE(authority.ok()) << authority.status();
+  const auto server = MakeServerCertificate(*authority, kNames);
+  ASSERT_TRUE(server.ok()) << server.status();
+  EXPECT_TRUE(SignedBy(server->certificate_pem, authority->certificate_pem));
+  EXPECT_TRUE(CheckPair(server->certificate_pem, server->key_pem).ok());
+  EXPECT_FALSE(CheckPair(server->certificate_pem, authority->key_pem).ok());
+  const auto facts = InspectCertificate(server->certificate_pem);
+  ASSERT_TRUE(facts.ok());
+  EXPECT_EQ(facts->names.dns, kNames.dns);
+  EXPECT_EQ(facts->names.addresses, kNames.addresses);
+  EXPECT_LE(facts->not_after_unix_s - facts->not_before_unix_s, 398 * kDay_s);
+  EXPECT_GT(facts->not_after_unix_s, kNow + 390 * kDay_s);
+  EXPECT_EQ(facts->sha256.size(), 95u);
+}
+
+TEST(Certificate, OfAnotherAuthorityIsNotOurs) {
+  const auto ours = MakeAuthority("a"), other = MakeAuthority("a");
+  const auto server = MakeServerCertificate(*other, kNames);
+  EXPECT_FALSE(SignedBy(server->certificate_pem, ours->certificate_pem));
+}
+
+TEST(Certificate, ThisMachineIsCalledByItsAddresses) {
+  const ServerNames names = ServerNames::OfThisMachine();
+  EXPECT_THAT(names.dns, Contains("localhost"));
+  EXPECT_THAT(names.addresses, Contains("127.0.0.1"));
+}
+
+TEST(ServerIdentity, IsMadeOnceForItsOwnerAlone) {
+  const TemporaryFolder folder;
+  const auto first = EnsureServerIdentity(folder.path(), kNames, kNow);
+  ASSERT_TRUE(first.ok()) << first.status();
+  for (const char* name : {"authority.pem", "authority.key", "server.pem", "server.key"}) {
+    struct stat facts {};
+    ASSERT_EQ(stat((folder / ("tls/" + std::string(name))).c_str(), &facts), 0) << name;
+    EXPECT_EQ(facts.st_mode & 0777u, 0600u) << name;
+  }
+  const auto second = EnsureServerIdentity(folder.path(), kNames, kNow + 300 * kDay_s);
+  ASSERT_TRUE(second.ok());
+  EXPECT_EQ(second->chain_pem, first->chain_pem);
+  EXPECT_EQ(second->key_pem, first->key_pem);
+}
+
+TEST(ServerIdentity, IsRenewedWhenItExpiresOrANameIsNewAndTheRootStays) {
+  const TemporaryFolder folder;
+  const auto first = EnsureServerIdentity(folder.path(), kNames, kNow);
+  ASSERT_TRUE(first.ok()) << first.status();
+  const auto later = EnsureServerIdentity(folder.path(), kNames, kNow + 380 * kDay_s);
+  ASSERT_TRUE(later.ok());
+  EXPECT_NE(later->chain_pem, first->chain_pem);
+  EXPECT_EQ(later->root_pem, first->root_pem);
+  ServerNames moved = kNames;
+  moved.addresses.push_back("10.9.9.9");
+  const auto elsewhere = EnsureServerIdentity(folder.path(), moved, kNow);
+  ASSERT_TRUE(elsewhere.ok());
+  EXPECT_THAT(InspectCertificate(elsewhere->chain_pem)->names.addresses, Contains("10.9.9.9"));
+  EXPECT_EQ(elsewhere->root_pem, first->root_pem);
+}
+
+TEST(ServerIdentity, ADamagedAuthorityIsSaidAndNotReplaced) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(EnsureServerIdentity(folder.path(), kNames, kNow).ok());
+  std::ofstream(folder / "tls/authority.pem") << "broken";
+  const auto identity = EnsureServerIdentity(folder.path(), kNames, kNow);
+  ASSERT_EQ(identity.status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(identity.status().message()), HasSubstr("authority.pem"));
+}
+
+TEST(ServerIdentity, AGivenCertificateIsCheckedBeforeItIsServed) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(EnsureServerIdentity(folder.path(), kNames, kNow).ok());
+  const std::string pem = folder / "tls/server.pem", key = folder / "tls/server.key";
+  const auto good = LoadServerIdentity(pem, key, kNow);
+  ASSERT_TRUE(good.ok()) << good.status();
+  EXPECT_EQ(good->root_pem, "") << "whoever gave it knows whom to trust";
+  EXPECT_THAT(std::string(LoadServerIdentity(pem, key, kNow + 500 * kDay_s).status().message()),
+              HasSubstr("expired"));
+  EXPECT_THAT(
+      std::string(LoadServerIdentity(pem, folder / "tls/authority.key", kNow).status().message()),
+      HasSubstr("not of the same pair"));
+}
+
+}  // namespace
+}  // namespace saccade

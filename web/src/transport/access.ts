@@ -1,0 +1,87 @@
+import { type Client, createClient, type Interceptor } from '@connectrpc/connect';
+import { createGrpcWebTransport } from '@connectrpc/connect-web';
+import { AccessService } from '../gen/saccade/v1/access_pb';
+
+type PassStorage = Pick<Storage, 'getItem' | 'setItem' | 'removeItem'>;
+
+/** What an invite was redeemed for: of the invite, only its id is kept. */
+interface Pass {
+  readonly inviteId: string;
+  readonly token: string;
+}
+
+const KEY = 'saccade.pass';
+const FRAGMENT = /^#invite=(.+)$/;
+
+/** The invite of a link, "ID.SECRET"; undefined: the link has none. */
+export const inviteOf = (hash: string): string | undefined => FRAGMENT.exec(hash)?.[1];
+
+/** Puts the token on every call. */
+export const bearing =
+  (token: () => string): Interceptor =>
+  (next) =>
+  (request) => {
+    if (token()) request.header.set('authorization', `Bearer ${token()}`);
+    return next(request);
+  };
+
+/**
+ * What lets this browser in. An invite is redeemed once; the pass that comes of it is kept for this
+ * tab, and for those that are opened without an invite later.
+ */
+export class Access {
+  private pass: Pass | undefined;
+  readonly client: Client<typeof AccessService>;
+
+  constructor(
+    baseUrl: string,
+    private invite: string | undefined,
+    private readonly tab: PassStorage,
+    private readonly browser: Pick<Storage, 'getItem' | 'setItem'>,
+    client?: Client<typeof AccessService>,
+  ) {
+    const interceptors = [bearing(() => this.token)];
+    this.client =
+      client ?? createClient(AccessService, createGrpcWebTransport({ baseUrl, interceptors }));
+    this.pass = read(tab) ?? read(browser);
+    // A link that was opened before: its invite may be used up, its pass still holds.
+    if (invite !== undefined && this.pass?.inviteId === idOf(invite)) this.invite = undefined;
+  }
+
+  /** Empty: none. */
+  get token(): string {
+    return this.pass?.token ?? '';
+  }
+
+  /** Redeems the invite of the link, if that was not done yet. Rejects if it lets nobody in. */
+  async enter(signal: AbortSignal): Promise<void> {
+    const { invite } = this;
+    if (invite === undefined) return;
+    this.pass = undefined; // who opens another link means that one
+    const { token } = await this.client.redeem({ invite }, { signal, timeoutMs: 5000 });
+    this.invite = undefined;
+    this.pass = { inviteId: idOf(invite), token };
+    const kept = JSON.stringify(this.pass);
+    for (const storage of [this.tab, this.browser]) {
+      try {
+        storage.setItem(KEY, kept);
+      } catch {
+        // Full or forbidden: then a reload needs a new link.
+      }
+    }
+  }
+}
+
+const idOf = (invite: string): string => invite.split('.', 1)[0] ?? '';
+
+function read(storage: Pick<Storage, 'getItem'>): Pass | undefined {
+  try {
+    const kept: unknown = JSON.parse(storage.getItem(KEY) ?? 'null');
+    if (typeof kept !== 'object' || kept === null) return undefined;
+    const { inviteId, token } = kept as { inviteId?: unknown; token?: unknown };
+    if (typeof inviteId !== 'string' || typeof token !== 'string') return undefined;
+    return { inviteId, token };
+  } catch {
+    return undefined;
+  }
+}
