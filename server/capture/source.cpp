@@ -4,6 +4,7 @@
 #include <absl/strings/str_join.h>
 
 #include "server/capture/dataset.hpp"
+#include "server/capture/v4l2/v4l2_source.hpp"
 
 namespace saccade {
 
@@ -34,6 +35,9 @@ SourceRegistry CaptureSources() {
   SourceRegistry registry;
   registry.Add("dataset", [](absl::string_view folder, const SourceOptions& options) {
     return OpenDataset(std::filesystem::path(std::string(folder)), options);
+  });
+  registry.Add("v4l2", [](absl::string_view rest, const SourceOptions& options) {
+    return OpenV4l2(rest, options);
   });
   return registry;
 }
