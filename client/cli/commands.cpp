@@ -199,6 +199,8 @@ absl::Status Run(const Options& options, net::Connection& connection) {
       return RunGaze(options, connection);
     case Command::kCalibrateMount:
       return RunCalibrateMount(options, connection);
+    case Command::kCameras:
+      break;  // asks no server
   }
   return absl::InternalError("unknown command");
 }

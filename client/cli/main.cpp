@@ -6,6 +6,7 @@
 #include <iostream>
 #include <string>
 
+#include "client/cli/cameras_command.hpp"
 #include "client/cli/commands.hpp"
 #include "client/cli/options.hpp"
 #include "client/cli/problem.hpp"
@@ -57,7 +58,8 @@ int main(int argc, char** argv) {
   if (!parsed.options) return parsed.exit_code;
   cli::Options& options = *parsed.options;
   try {
-    const absl::Status status = RunWithSession(options);
+    const absl::Status status = options.command == cli::Command::kCameras ? cli::RunCameras(options)
+                                                                          : RunWithSession(options);
     if (!status.ok()) return Fail(options, status);
   } catch (const std::exception& error) {
     return Fail(options, absl::InternalError(error.what()));

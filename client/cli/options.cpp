@@ -149,7 +149,8 @@ Command CommandOf(const CLI::App& app) {
       {"stop", Command::kStop},
       {"release", Command::kRelease},
       {"home", Command::kHome},
-      {"calibrate-mount", Command::kCalibrateMount}};
+      {"calibrate-mount", Command::kCalibrateMount},
+      {"cameras", Command::kCameras}};
   const CLI::App* chosen = app.get_subcommands().front();
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());
@@ -234,6 +235,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddAnnotations(app, options);
   AddGaze(app, options, raw);
   AddCalibrateMount(app, options);
+  app.add_subcommand("cameras", "The cameras of this machine, with their modes; needs no server");
 
   try {
     app.parse(argc, argv);

@@ -34,6 +34,7 @@ enum class Command {
   kRelease,
   kHome,
   kCalibrateMount,
+  kCameras,  // this machine's; asks no server
 };
 
 /// The command line, parsed and checked.
