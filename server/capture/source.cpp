@@ -33,9 +33,7 @@ absl::StatusOr<std::unique_ptr<FrameSource>> SourceRegistry::Open(
 
 SourceRegistry CaptureSources() {
   SourceRegistry registry;
-  registry.Add("dataset", [](absl::string_view folder, const SourceOptions& options) {
-    return OpenDataset(std::filesystem::path(std::string(folder)), options);
-  });
+  registry.Add("dataset", OpenDatasetUri);
   registry.Add("v4l2", [](absl::string_view rest, const SourceOptions& options) {
     return OpenV4l2(rest, options);
   });

@@ -22,6 +22,7 @@ struct RunArguments {
   std::vector<std::string> drop;  // A:B each
   std::uint64_t every = 1;
   std::string freeze;  // K:SECONDS, empty for none
+  double fps = 0;      // of pictures without time stamps; 0: not given
   bool json = false;
 };
 struct ScoreArguments {

@@ -49,7 +49,12 @@ CLI::Validator NotNegative() {
 
 void AddRun(CLI::App& app, RunArguments& arguments) {
   CLI::App* run = app.add_subcommand("run", "Track a recording and score it");
-  run->add_option("--dataset", arguments.dataset, "Folder in TUM layout")->required();
+  run->add_option("--dataset", arguments.dataset,
+                  "Folder in TUM or EuRoC layout, or of pictures with --fps")
+      ->required();
+  run->add_option("--fps", arguments.fps, "Pictures a second, where there are no time stamps")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->check(Finite());
   run->add_option("--out", arguments.out, "Folder for trajectory.tum, frames.csv and report.json")
       ->required();
   run->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
