@@ -13,6 +13,9 @@ find_package(SQLite3 REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(OpenH264 REQUIRED IMPORTED_TARGET openh264)
 pkg_check_modules(OSMesa REQUIRED IMPORTED_TARGET osmesa)
+pkg_check_modules(Seccomp REQUIRED IMPORTED_TARGET libseccomp)
+# Of saccade-decode alone (architecture, section 7).
+pkg_check_modules(VideoDecoder REQUIRED IMPORTED_TARGET libavformat libavcodec libswscale libavutil)
 pkg_check_modules(Zstd REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(TextDrawing REQUIRED IMPORTED_TARGET freetype2 harfbuzz fribidi fontconfig)
 

@@ -5,6 +5,7 @@
 
 #include "server/capture/dataset.hpp"
 #include "server/capture/v4l2/v4l2_source.hpp"
+#include "server/capture/video/video_source.hpp"
 
 namespace saccade {
 
@@ -36,6 +37,12 @@ SourceRegistry CaptureSources() {
   registry.Add("dataset", OpenDatasetUri);
   registry.Add("v4l2", [](absl::string_view rest, const SourceOptions& options) {
     return OpenV4l2(rest, options);
+  });
+  registry.Add("file", [](absl::string_view rest, const SourceOptions& options) {
+    return OpenVideoFile(rest, options);
+  });
+  registry.Add("rtsp", [](absl::string_view rest, const SourceOptions& options) {
+    return OpenRtsp(rest, options);
   });
   return registry;
 }
