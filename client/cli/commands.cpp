@@ -200,6 +200,7 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kCalibrateMount:
       return RunCalibrateMount(options, connection);
     case Command::kCameras:
+    case Command::kRecord:
       break;  // asks no server
   }
   return absl::InternalError("unknown command");

@@ -10,6 +10,7 @@
 #include "client/cli/commands.hpp"
 #include "client/cli/options.hpp"
 #include "client/cli/problem.hpp"
+#include "client/cli/record_command.hpp"
 #include "client/cli/session_file.hpp"
 #include "client/cli/text.hpp"
 #include "client/net/connection.hpp"
@@ -48,6 +49,12 @@ absl::Status RunWithSession(cli::Options& options) {
   return status;
 }
 
+absl::Status RunCommand(cli::Options& options) {
+  if (options.command == cli::Command::kCameras) return cli::RunCameras(options);
+  if (options.command == cli::Command::kRecord) return cli::RunRecord(options);
+  return RunWithSession(options);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -58,8 +65,7 @@ int main(int argc, char** argv) {
   if (!parsed.options) return parsed.exit_code;
   cli::Options& options = *parsed.options;
   try {
-    const absl::Status status = options.command == cli::Command::kCameras ? cli::RunCameras(options)
-                                                                          : RunWithSession(options);
+    const absl::Status status = RunCommand(options);
     if (!status.ok()) return Fail(options, status);
   } catch (const std::exception& error) {
     return Fail(options, absl::InternalError(error.what()));

@@ -34,7 +34,8 @@ enum class Command {
   kRelease,
   kHome,
   kCalibrateMount,
-  kCameras,  // this machine's; asks no server
+  kCameras,  // of this machine; asks no server
+  kRecord,   // likewise
 };
 
 /// The command line, parsed and checked.
@@ -51,6 +52,9 @@ struct Options {
   GazeTarget gaze;                             // fixate
   bool fast = false;                           // fixate: at the mount's own limits
   double gaze_s = 0;                           // fixate, home: end after this time; 0: see --help
+  struct Record {
+    std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them
+  } record;
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".

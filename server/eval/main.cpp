@@ -121,11 +121,18 @@ void AddRender(CLI::App& app, RenderArguments& arguments) {
 }
 
 void AddRecord(CLI::App& app, RenderArguments& arguments) {
-  CLI::App* record =
-      app.add_subcommand("record", "Write the simulator as a recording with ground truth");
-  record->add_option("--source", arguments.source, "sim:desk[?key=value&...]")->required();
+  CLI::App* record = app.add_subcommand(
+      "record", "Write a source as a recording; the simulator with ground truth");
+  record
+      ->add_option("--source", arguments.source,
+                   "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?key=value&...]")
+      ->required();
   record->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
   record->add_option("--out", arguments.out, "Folder in TUM layout to write")->required();
+  record->add_option("--camera", arguments.camera, "camera.yaml instead of the source's own");
+  record->add_option("--for", arguments.seconds, "End after so many seconds; else Ctrl-C does")
+      ->check(CLI::Range(0.01, 1e6))
+      ->check(Finite());
 }
 
 /// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell

@@ -22,6 +22,7 @@ constexpr milliseconds kFileHangs(2'000), kStreamHangs(5'000);
 constexpr milliseconds kRetry(100), kMostRetry(2'000);
 constexpr int kMostDeaths = 6;                      // one after the other, of a file
 constexpr std::int64_t kLeaveOut_ns = 500'000'000;  // where decoders die
+constexpr Timestamp kTellAgain_ns = 5'000'000'000;
 constexpr std::size_t kReadAhead = 4;
 
 }  // namespace
@@ -181,30 +182,31 @@ bool DecodedSource::Deliver(Picture picture, std::int64_t time_ns, const std::st
 }
 
 absl::Status DecodedSource::Judge(const absl::Status& death, const std::stop_token& stop) {
-  ++deaths_;
+  // Out of descriptors or processes: that says nothing about the video.
+  const bool shortage = absl::IsResourceExhausted(death);
+  const bool live = request_.live();
+  if (!shortage) ++deaths_;
   const std::string where =
-      request_.live() ? ""
-                      : absl::StrFormat(" at %.3f s", Seconds(std::max<Timestamp>(after_ns_, 0)));
-  if (deaths_ == 1 || (deaths_ <= kMostDeaths && !request_.live())) {
+      live ? "" : absl::StrFormat(" at %.3f s", Seconds(std::max<Timestamp>(after_ns_, 0)));
+  if (MonotonicNow() - told_ns_ > kTellAgain_ns || (deaths_ == 1 && !shortage)) {
+    told_ns_ = MonotonicNow();
     Log(absl::StrCat("source ", info_.uri, where, ": ", death.message(), "; started anew"));
   }
-  if (!request_.live()) {
-    if (deaths_ > kMostDeaths) {
-      return absl::DataLossError(absl::StrCat(
-          request_.input.name(), where, ": the decoder ends again and again (", death.message(),
-          "); the file may be damaged there: cut it, or convert it anew"));
-    }
-    if (deaths_ > 1) {  // it is this place
-      after_ns_ = std::max<std::int64_t>(after_ns_, 0) + kLeaveOut_ns;
-      ++bad_;
-    }
+  if (!shortage && !live && deaths_ > kMostDeaths) {
+    return absl::DataLossError(absl::StrCat(
+        request_.input.name(), where, ": the decoder ends again and again (", death.message(),
+        "); the file may be damaged there: cut it, or convert it anew"));
   }
-  if (deaths_ == 1 && !request_.live()) return absl::OkStatus();
-  const milliseconds wait = std::min(kMostRetry, deaths_ * kRetry);
+  if (!shortage && !live && deaths_ > 1) {  // it is this place
+    after_ns_ = std::max<std::int64_t>(after_ns_, 0) + kLeaveOut_ns;
+    ++bad_;
+  }
+  if (!shortage && deaths_ == 1) return absl::OkStatus();
   std::mutex mutex;
   std::condition_variable_any never;
   std::unique_lock lock(mutex);
-  never.wait_for(lock, stop, wait, [] { return false; });
+  never.wait_for(lock, stop, std::clamp(deaths_ * kRetry, kRetry, kMostRetry),
+                 [] { return false; });
   return absl::OkStatus();
 }
 

@@ -85,7 +85,7 @@ class DecodedSource final : public VideoSource {
   StreamClock clock_;
   FrameId next_id_ = 0;
   std::int64_t after_ns_ = -1;
-  Timestamp last_capture_ns_ = 0;
+  Timestamp last_capture_ns_ = 0, told_ns_ = 0;
   std::uint64_t bad_of_process_ = 0;
   int deaths_ = 0;
   bool ended_ = false;

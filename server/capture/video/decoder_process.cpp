@@ -69,7 +69,9 @@ int Spawn(const std::filesystem::path& program, const std::vector<std::string>& 
   sigfillset(&defaults);
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setsigdefault(&attributes, &defaults);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  posix_spawnattr_setpgroup(&attributes, 0);  // Ctrl-C is the parent's to hear
+  posix_spawnattr_setflags(&attributes,
+                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
   char* const no_environment[] = {nullptr};
   const int error =
       posix_spawn(pid, program.c_str(), &actions, &attributes, argv.data(), no_environment);
