@@ -23,6 +23,7 @@ absl::Status RunRecord(const Options& options) {
     if (!value->empty()) words.insert(words.end(), {flag, *value});
   }
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   execv(program.c_str(), argv.data());

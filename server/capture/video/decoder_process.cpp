@@ -50,6 +50,7 @@ std::filesystem::path DecoderProgram() {
 int Spawn(const std::filesystem::path& program, const std::vector<std::string>& words, int in,
           int out, pid_t* pid) {
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;

@@ -44,7 +44,8 @@ class VideoOfARecording : public ::testing::Test {
   fs::path WriteConcat() {
     std::ofstream concat(folder_ / "list.txt");
     for (std::size_t i = 0; i < files_.size(); ++i) {
-      concat << "file '" << fs::canonical(set_ / files_[i]).string() << "'\n";
+      concat << "file '" << fs::canonical(set_ / files_[i]).string() << "'\n"
+             << "option framerate 1000000\n";  // else durations are rounded to 40 ms
       const double next = i + 1 < files_.size() ? std::stod(stamps_[i + 1]) : 0;
       const double lasts = next > 0 ? next - std::stod(stamps_[i]) : 1.0 / 30;
       concat << "duration " << std::to_string(lasts) << "\n";
@@ -81,7 +82,8 @@ TEST_F(VideoOfARecording, IsTrackedAsItsPicturesAre) {
              {"-vsync", "vfr", "-enc_time_base", "1/1000000", "-video_track_timescale", "1000000",
               "-c:v", "libx264", "-preset", "veryfast", "-crf", "16"}},
         Case{"walk.mkv", {"-vsync", "vfr", "-enc_time_base", "1/1000", "-c:v", "ffv1"}},
-        Case{"walk.avi", {"-vsync", "cfr", "-r", "30", "-c:v", "mjpeg", "-q:v", "2"}}}) {
+        Case{"walk.avi",
+             {"-vsync", "vfr", "-enc_time_base", "1/1000", "-c:v", "mjpeg", "-q:v", "2"}}}) {
     SCOPED_TRACE(each.name);
     const std::string video = folder_ / each.name;
     std::vector<std::string> words = {"/usr/bin/ffmpeg", "-v",    "error", "-y", "-f",
@@ -99,8 +101,8 @@ TEST_F(VideoOfARecording, IsTrackedAsItsPicturesAre) {
     fs::copy_file(set_ / "groundtruth.txt", back / "groundtruth.txt");
     const double ate = Ate(back, std::string(each.name) + ".run");
     std::printf("%s: %.4f m\n", each.name, ate);
-    // Noise: what other pictures of the same walk make of it.
-    EXPECT_LT(ate, pictures + 0.006);
+    // Noise: seeds and coding move it by 0.7 mm; times rounded to 40 ms double it.
+    EXPECT_LT(ate, pictures + 0.002);
   }
 }
 
