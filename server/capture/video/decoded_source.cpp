@@ -23,7 +23,15 @@ constexpr milliseconds kRetry(100), kMostRetry(2'000);
 constexpr int kMostDeaths = 6;                      // one after the other, of a file
 constexpr std::int64_t kLeaveOut_ns = 500'000'000;  // where decoders die
 constexpr Timestamp kTellAgain_ns = 5'000'000'000;
-constexpr std::size_t kReadAhead = 4;
+constexpr std::size_t kReadAhead = 4;       // frames
+constexpr std::size_t kMostReadAhead = 45;  // 1.5 s: what a new decoder may take to get there
+constexpr std::size_t kReadAheadBytes = std::size_t{64} << 20;
+
+std::size_t ReadAhead(Pace pace, const DecodeHeader& info) {
+  if (pace != Pace::kDue) return kReadAhead;
+  const std::size_t bytes = std::size_t{4} * info.width * info.height;
+  return std::clamp(kReadAheadBytes / bytes, kReadAhead, kMostReadAhead);
+}
 
 }  // namespace
 
@@ -52,7 +60,7 @@ DecodedSource::DecodedSource(VideoRequest request, SourceInfo info, OpenedDecode
       info_(std::move(info)),
       size_(static_cast<int>(decoder.info.width), static_cast<int>(decoder.info.height)),
       process_(std::move(decoder.process)),
-      queue_(request_.pace, kReadAhead) {
+      queue_(request_.pace, ReadAhead(request_.pace, decoder.info)) {
   pid_ = process_->pid();
   reader_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
@@ -152,7 +160,7 @@ absl::Status DecodedSource::TakeFrame(const DecodeHeader& header, const std::sto
   } catch (const std::exception& e) {  // no memory
     return absl::UnavailableError(absl::StrCat("a frame cannot be kept (", e.what(), ")"));
   }
-  deaths_ = 0;
+  deaths_ = attempts_ = 0;
   after_ns_ = header.time_ns;
   if (!Deliver(std::move(picture), header.time_ns, stop)) return absl::CancelledError("");
   return absl::OkStatus();
@@ -182,31 +190,33 @@ bool DecodedSource::Deliver(Picture picture, std::int64_t time_ns, const std::st
 }
 
 absl::Status DecodedSource::Judge(const absl::Status& death, const std::stop_token& stop) {
-  // Out of descriptors or processes: that says nothing about the video.
-  const bool shortage = absl::IsResourceExhausted(death);
   const bool live = request_.live();
-  if (!shortage) ++deaths_;
+  const bool killed = absl::IsAborted(death);
+  // Killed by others, or out of descriptors: that says nothing about the video.
+  const bool blamed = !live && !killed && !absl::IsResourceExhausted(death);
+  ++attempts_;
+  if (blamed) ++deaths_;
   const std::string where =
       live ? "" : absl::StrFormat(" at %.3f s", Seconds(std::max<Timestamp>(after_ns_, 0)));
-  if (MonotonicNow() - told_ns_ > kTellAgain_ns || (deaths_ == 1 && !shortage)) {
+  if (attempts_ == 1 || MonotonicNow() - told_ns_ > kTellAgain_ns) {
     told_ns_ = MonotonicNow();
     Log(absl::StrCat("source ", info_.uri, where, ": ", death.message(), "; started anew"));
   }
-  if (!shortage && !live && deaths_ > kMostDeaths) {
+  if (deaths_ > kMostDeaths) {
     return absl::DataLossError(absl::StrCat(
         request_.input.name(), where, ": the decoder ends again and again (", death.message(),
         "); the file may be damaged there: cut it, or convert it anew"));
   }
-  if (!shortage && !live && deaths_ > 1) {  // it is this place
+  if (blamed && deaths_ > 1) {  // it is this place
     after_ns_ = std::max<std::int64_t>(after_ns_, 0) + kLeaveOut_ns;
     ++bad_;
   }
-  if (!shortage && deaths_ == 1) return absl::OkStatus();
+  if (attempts_ <= (killed ? 3 : 1) && !absl::IsResourceExhausted(death)) return absl::OkStatus();
+  const milliseconds wait = killed ? kRetry : std::min(attempts_ * kRetry, kMostRetry);
   std::mutex mutex;
   std::condition_variable_any never;
   std::unique_lock lock(mutex);
-  never.wait_for(lock, stop, std::clamp(deaths_ * kRetry, kRetry, kMostRetry),
-                 [] { return false; });
+  never.wait_for(lock, stop, wait, [] { return false; });
   return absl::OkStatus();
 }
 

@@ -87,7 +87,7 @@ class DecodedSource final : public VideoSource {
   std::int64_t after_ns_ = -1;
   Timestamp last_capture_ns_ = 0, told_ns_ = 0;
   std::uint64_t bad_of_process_ = 0;
-  int deaths_ = 0;
+  int deaths_ = 0, attempts_ = 0;  // since the last frame: for which the video is to blame; all
   bool ended_ = false;
 
   FrameQueue queue_;

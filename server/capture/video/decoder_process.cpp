@@ -123,10 +123,22 @@ DecoderProcess::~DecoderProcess() {
 }
 
 absl::Status DecoderProcess::Death() {
-  kill(pid_, SIGKILL);  // it may live on with its pipe closed
   int status = 0;
-  const bool known = waitpid(pid_, &status, 0) == pid_;
+  bool known = false;
+  for (int i = 0; i < 100 && !known; ++i) {  // its pipe closes a little before it is gone
+    known = waitpid(pid_, &status, WNOHANG) == pid_;
+    if (!known) poll(nullptr, 0, 1);
+  }
+  const bool killed = known;  // by others, if at all
+  if (!known) {               // it lives on with its pipe closed
+    kill(pid_, SIGKILL);
+    known = waitpid(pid_, &status, 0) == pid_;
+  }
   reaped_ = true;
+  const int signal = known && WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  if (killed && (signal == SIGKILL || signal == SIGTERM)) {
+    return absl::AbortedError(absl::StrCat("the decoder was killed by signal ", signal));
+  }
   if (known && WIFSIGNALED(status)) {
     return absl::UnavailableError(absl::StrCat("the decoder died of signal ", WTERMSIG(status)));
   }

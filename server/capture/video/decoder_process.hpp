@@ -37,7 +37,8 @@ class DecoderProcess {
   /// The next message without what follows it; that is ReadBytes' to fetch, all of it.
   ///   Cancelled         `stopped` says so (asked every tenth of a second)
   ///   DeadlineExceeded  nothing came for so long
-  ///   Unavailable       the child has died, or writes nonsense: says how
+  ///   Aborted           somebody has killed the child
+  ///   Unavailable       it has died by itself, or writes nonsense: says how
   absl::StatusOr<DecodeHeader> ReadHeader(const std::function<bool()>& stopped,
                                           std::chrono::milliseconds most);
   absl::Status ReadBytes(void* out, std::size_t size, const std::function<bool()>& stopped);
