@@ -248,6 +248,7 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenDataset(const std::filesystem::
   SourceInfo info;
   info.uri = absl::StrCat("dataset:", folder.string());
   info.remark = layout->remark;
+  if (!info.remark.empty()) Log(absl::StrCat("source ", info.uri, ": ", info.remark));
   info.camera = std::make_shared<const CameraModel>(layout->camera);
   info.frame_count = end - options.first_frame;
   if (const absl::Status status = ReadFacts(folder, options.first_frame, &info); !status.ok()) {
