@@ -22,7 +22,8 @@ struct DecodeHeader {
   std::uint32_t size = 0;               // bytes that follow
   std::int64_t time_ns = 0;             // presentation time, of the video's own clock
   std::uint64_t bad = 0;                // packets so far that could not be decoded
-  double fps = 0;                       // 0: the video does not say
+  std::uint32_t clockwise_deg = 0;  // kInfo: 0, 90, 180, 270: what makes it upright, by the file
+  double fps = 0;                   // 0: the video does not say
 };
 
 /// Its standard input is the file, opened by whoever starts it: it can open none itself.

@@ -21,6 +21,11 @@ UriQuery::UriQuery(absl::string_view scheme, absl::string_view rest) : scheme_(s
   }
 }
 
+bool UriQuery::Has(absl::string_view key) const {
+  return std::any_of(values_.begin(), values_.end(),
+                     [&](const auto& each) { return each.first == key; });
+}
+
 std::optional<std::string> UriQuery::Text(absl::string_view key) {
   const auto found = std::find_if(values_.begin(), values_.end(),
                                   [&](const auto& each) { return each.first == key; });

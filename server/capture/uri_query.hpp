@@ -18,6 +18,7 @@ class UriQuery {
   UriQuery(absl::string_view scheme, absl::string_view rest);
 
   const std::string& path() const { return path_; }
+  bool Has(absl::string_view key) const;
   /// The value, or nothing if the key is absent.
   std::optional<std::string> Text(absl::string_view key);
   /// `form` says what is expected ("a number from 1 to 240").

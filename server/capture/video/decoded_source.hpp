@@ -25,6 +25,7 @@ struct VideoRequest {
   VideoInput input;
   std::int64_t start_ns = 0;
   Turn turn;
+  bool turn_by_file = true;  // as the file says, unless it was asked for otherwise
   Pace pace = Pace::kEvery;
   std::uint64_t first = 0;
   std::optional<std::uint64_t> end;

@@ -3,6 +3,7 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libavutil/display.h>
 #include <libavutil/imgutils.h>
 #include <libavutil/pixdesc.h>
 #include <libswscale/swscale.h>
@@ -10,6 +11,7 @@ extern "C" {
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <vector>
@@ -54,6 +56,15 @@ std::string Words(int error) {
   char text[AV_ERROR_MAX_STRING_SIZE] = {};
   av_strerror(error, text, sizeof text);
   return text;
+}
+
+/// What the file says of how the camera was held, as telephones do: a quarter turn, or none.
+std::uint32_t ClockwiseOf(const AVStream& stream) {
+  const std::uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  if (matrix == nullptr) return 0;
+  const double turn = -av_display_rotation_get(reinterpret_cast<const std::int32_t*>(matrix));
+  if (!std::isfinite(turn)) return 0;
+  return static_cast<std::uint32_t>(std::lround(turn / 90) % 4 + 4) % 4 * 90;
 }
 
 int ReadInput(void*, std::uint8_t* buffer, int size) {
@@ -161,6 +172,7 @@ class Decoder {
     info.height = static_cast<std::uint32_t>(codec_->height);
     const AVRational rate = av_guess_frame_rate(format_, stream_, nullptr);
     if (rate.num > 0 && rate.den > 0) info.fps = av_q2d(rate);
+    info.clockwise_deg = ClockwiseOf(*stream_);
     frame_ns_ = static_cast<std::int64_t>(1e9 / (info.fps > 0 ? info.fps : 30.0));
     return SendText(info, decoder->name);
   }

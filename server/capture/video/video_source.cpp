@@ -29,6 +29,9 @@ absl::StatusOr<std::unique_ptr<VideoSource>> Open(VideoRequest request, std::str
     return absl::Status(decoder.status().code(),
                         absl::StrCat("source ", uri, ": ", decoder.status().message()));
   }
+  if (request.turn_by_file) {
+    request.turn.clockwise_deg = static_cast<int>(decoder->info.clockwise_deg % 360);
+  }
   cv::Size size(static_cast<int>(decoder->info.width), static_cast<int>(decoder->info.height));
   if (request.turn.swaps_sides()) std::swap(size.width, size.height);
   SourceInfo info;
@@ -69,6 +72,7 @@ absl::StatusOr<std::unique_ptr<VideoSource>> OpenVideoFile(absl::string_view res
       if (!time.ok()) query.Fail("start", time.status().message());
       if (time.ok()) request.start_ns = *time;
     }
+    request.turn_by_file = !query.Has("rotate");
     request.turn = ReadTurn(query);
     const absl::Status status = query.Finish("start, rotate and mirror");
     if (!status.ok()) return status;

@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -26,6 +27,11 @@ class VideoFixture : public testing::Test {
     Make("walk.mp4", "-c:v libx264 -preset ultrafast -g 30 -pix_fmt yuv420p");
     Make("walk.mkv", "-c:v ffv1 -pix_fmt bgr0", 40);
     Make("walk.avi", "-c:v mjpeg -q:v 2 -pix_fmt yuvj420p", 40);
+    Make("lying.mp4", "-c:v libx264 -preset ultrafast -pix_fmt yuv420p", 5);
+    // What telephones write; ffmpeg itself shows this one turned to the left.
+    const std::string held = "ffmpeg -v error -y -i " + File("lying.mp4") + " -c copy " +
+                             "-metadata:s:v rotate=90 " + File("held.mp4");
+    ASSERT_EQ(std::system(held.c_str()), 0);
     Make("grey.mkv", "-c:v ffv1 -pix_fmt gray", 10);
     // The time between frames grows: 10, 20, 30 ... ms.
     Make("uneven.mp4",

@@ -127,6 +127,20 @@ TEST_F(Video, RangeTurnAndCameraFileAreObeyed) {
       AllOf(HasSubstr("is of pictures of 320x240"), HasSubstr("are 240x320")));
 }
 
+TEST_F(Video, TelephonesFileSaysHowItWasHeld) {
+  cv::Mat upright, difference;
+  cv::rotate(PictureOf(0), upright, cv::ROTATE_90_COUNTERCLOCKWISE);
+  const auto source = Open(File("held.mp4"));
+  ASSERT_TRUE(source.ok());
+  const auto frame = (*source)->Next();
+  ASSERT_EQ((*frame)->color.size(), upright.size());
+  cv::absdiff((*frame)->color, upright, difference);
+  EXPECT_LT(cv::mean(difference)[0], 4.0);
+  EXPECT_EQ((*source)->info().camera->width(), kHeight);
+  const auto as_coded = Open(File("held.mp4") + "?rotate=0");
+  EXPECT_EQ((*(*as_coded)->Next())->color.size(), cv::Size(kWidth, kHeight));
+}
+
 TEST_F(Video, DecoderKilledTwentyTimesLosesNoFrame) {
   const auto source = Open(File("walk.mp4"));
   ASSERT_TRUE(source.ok());
@@ -151,7 +165,7 @@ TEST_F(Video, KilledTwentyTimesNoFrameInRealTimeIsASecondLate) {
   std::atomic<bool> over = false;
   std::thread killer([&] {
     for (int i = 0; i < 20 && !over; ++i) {
-      std::this_thread::sleep_for(milliseconds(330));
+      std::this_thread::sleep_for(milliseconds(280));
       if (const pid_t decoder = (*source)->decoder_pid(); decoder > 0) kill(decoder, SIGKILL);
     }
   });
@@ -174,7 +188,7 @@ TEST_F(Video, KilledTwentyTimesNoFrameInRealTimeIsASecondLate) {
               static_cast<int>((*source)->decoder_restarts()));
   EXPECT_LT(Seconds(longest_ns), 1.0);
   EXPECT_EQ(last, kFrames - 1);
-  EXPECT_GE((*source)->decoder_restarts(), 15u);
+  EXPECT_GE((*source)->decoder_restarts(), 12u);  // near the end all is decoded already
   EXPECT_GT(frames, kFrames / 2);
 }
 
