@@ -8,9 +8,11 @@
 
 #include "client/cli/access_commands.hpp"
 #include "client/cli/access_files.hpp"
+#include "client/cli/cameras_command.hpp"
 #include "client/cli/commands.hpp"
 #include "client/cli/options.hpp"
 #include "client/cli/problem.hpp"
+#include "client/cli/record_command.hpp"
 #include "client/cli/session_file.hpp"
 #include "client/cli/text.hpp"
 #include "client/net/connection.hpp"
@@ -51,6 +53,12 @@ absl::Status RunWithSession(cli::Options& options) {
   return status;
 }
 
+absl::Status RunCommand(cli::Options& options) {
+  if (options.command == cli::Command::kCameras) return cli::RunCameras(options);
+  if (options.command == cli::Command::kRecord) return cli::RunRecord(options);
+  return RunWithSession(options);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -61,7 +69,7 @@ int main(int argc, char** argv) {
   if (!parsed.options) return parsed.exit_code;
   cli::Options& options = *parsed.options;
   try {
-    const absl::Status status = RunWithSession(options);
+    const absl::Status status = RunCommand(options);
     if (!status.ok()) return Fail(options, status);
   } catch (const std::exception& error) {
     return Fail(options, absl::InternalError(error.what()));

@@ -133,6 +133,21 @@ void AddCalibrateMount(CLI::App& app, Options& options) {
                         "Write the [mount_model] table to this new TOML file; else print it");
 }
 
+void AddMachine(CLI::App& app, Options& options) {
+  app.add_subcommand("cameras", "The cameras of this machine, with their modes; needs no server");
+  CLI::App* record = app.add_subcommand(
+      "record", "Write a source as a recording that --source dataset:DIR opens; needs no server");
+  record
+      ->add_option("--source", options.record.source,
+                   "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?...]")
+      ->required();
+  record->add_option("--out", options.out, "The folder to write")->required();
+  record->add_option("--frames", options.record.frames, "Half-open range A:B of frames, from zero");
+  record->add_option("--for", options.record.seconds,
+                     "End after so many seconds; else Ctrl-C does");
+  record->add_option("--camera", options.record.camera, "camera.yaml instead of the source's own");
+}
+
 Command CommandOf(const CLI::App& app) {
   static const std::map<std::string, Command> commands = {
       {"status", Command::kStatus},
@@ -155,7 +170,9 @@ Command CommandOf(const CLI::App& app) {
       {"invite", Command::kInvite},
       {"invites", Command::kInvites},
       {"revoke", Command::kRevoke},
-      {"audit", Command::kAudit}};
+      {"audit", Command::kAudit},
+      {"cameras", Command::kCameras},
+      {"record", Command::kRecord}};
   const CLI::App* chosen = app.get_subcommands().front();
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());
@@ -241,6 +258,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddGaze(app, options, raw);
   AddCalibrateMount(app, options);
   AddAccess(app, options);
+  AddMachine(app, options);
 
   try {
     app.parse(argc, argv);

@@ -39,6 +39,8 @@ enum class Command {
   kInvites,
   kRevoke,
   kAudit,
+  kCameras,  // of this machine; asks no server
+  kRecord,   // likewise
 };
 
 /// The command line, parsed and checked.
@@ -66,6 +68,9 @@ struct Options {
   std::uint32_t most = 1000;  // audit
   std::uint32_t uses = 1;     // invite
   double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
+  struct Record {
+    std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them
+  } record;
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".

@@ -26,6 +26,11 @@ const cv::Mat& PictureOf(const Frame& frame) {
   return frame.color.empty() ? frame.grey : frame.color;
 }
 
+/// As status and page show it.
+std::string NameOf(const SourceInfo& info) {
+  return info.remark.empty() ? info.uri : absl::StrCat(info.uri, " (", info.remark, ")");
+}
+
 constexpr int kTrimEveryS = 2;
 constexpr int kCodeEveryS = 60;  // and after 1, 2, 4 ... seconds, while the start comes to its end
 
@@ -33,7 +38,7 @@ constexpr int kCodeEveryS = 60;  // and after 1, 2, 4 ... seconds, while the sta
 
 Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, EventSink& sink)
     : options_(std::move(options)),
-      facts_{options_.version, source->info().uri, source->info().camera},
+      facts_{options_.version, NameOf(source->info()), source->info().camera},
       sink_(sink),
       source_(std::move(source)),
       inbox_(options_.mailbox),
@@ -103,6 +108,7 @@ void Engine::RunSource(std::stop_token stop) {
   while (!stop.stop_requested()) {
     absl::StatusOr<std::optional<Frame>> frame = source_->Next();
     bad_frames_ = source_->bad_frames();
+    source_dropped_ = source_->dropped_frames();
     if (!frame.ok()) Log(absl::StrCat("source: ", frame.status().ToString()));
     if (!frame.ok() || !frame->has_value()) break;
     captured_.Add(MonotonicNow(), 1.0);
@@ -299,7 +305,7 @@ EngineStatistics Engine::Statistics() const {
   statistics.tracked_fps = track.rate_hz;
   statistics.track_ms_p50 = track.p50;
   statistics.track_ms_p95 = track.p95;
-  statistics.frames_dropped = dropped_;
+  statistics.frames_dropped = dropped_ + source_dropped_;
   statistics.bad_frames = bad_frames_;
   for (const auto& view : views_) {
     const RollingStatistics::Summary coded = view->milliseconds();

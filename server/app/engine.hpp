@@ -113,7 +113,7 @@ class Engine : public Backend {
   Timestamp gap_told_ns_ = 0;  // MonotonicNow() of the last word on a gap
 
   RollingStatistics captured_, track_ms_;
-  std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, bad_frames_ = 0;
+  std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, source_dropped_ = 0, bad_frames_ = 0;
   std::atomic<Timestamp> tracked_ns_ = 0;  // when a frame last came
 
   std::unique_ptr<GazeRunner> gaze_;  // null: no mount

@@ -51,14 +51,14 @@ absl::StatusOr<CameraIntrinsics> LoadCamera(const std::filesystem::path& file,
     if (!foreign) return status;
     // All of it at once, so that nobody has to come back for the next error.
     return absl::Status(status.code(), absl::StrCat(status.message(), ". Read as ", form.name,
-                                                    "; as a camera.yaml it is ", CameraYaml(draft),
+                                                    "; as a camera.yaml it is ", CameraLine(draft),
                                                     ": save that, corrected, and give it"));
   }
   for (const std::string& warning : warnings) Log(warning);
   if (foreign) {
     Log(absl::StrCat(draft.file, ": read as ", form.name,
                      draft.camera.empty() ? "" : absl::StrCat(", ", draft.camera), ": ",
-                     CameraYaml(draft)));
+                     CameraLine(draft)));
   }
   return draft.lens;
 }

@@ -12,12 +12,13 @@
 #include <thread>
 #include <utility>
 
-#include "server/capture/camera_file.hpp"
+#include "server/capture/dataset_layout.hpp"
 #include "server/capture/frame_decoder.hpp"
 #include "server/capture/gap.hpp"
 #include "server/capture/image_list.hpp"
 #include "server/capture/picture_size.hpp"
 #include "server/capture/target_file.hpp"
+#include "server/capture/uri_query.hpp"
 #include "shared/io/log.hpp"
 #include "shared/io/regular_file.hpp"
 
@@ -184,19 +185,6 @@ class RealtimeSource final : public DatasetSource {
   Timestamp origin_ns_ = 0;  // steady clock minus capture clock
 };
 
-absl::Status CheckFolder(const std::filesystem::path& folder) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder, error)) {
-    return absl::NotFoundError(absl::StrCat(
-        folder.string(), ": no such folder; give the folder that holds rgb.txt and camera.yaml"));
-  }
-  if (std::filesystem::is_directory(folder / "mav0", error)) {
-    return absl::UnimplementedError(absl::StrCat(
-        folder.string(), ": EuRoC layout (mav0/) is not read yet; convert it to TUM layout"));
-  }
-  return absl::OkStatus();
-}
-
 /// Target and start pose, where the folder has them.
 absl::Status ReadFacts(const std::filesystem::path& folder, std::uint64_t first_frame,
                        SourceInfo* info) {
@@ -249,30 +237,27 @@ absl::Status CheckFirstPicture(const FrameDecoder& decoder, std::uint64_t first,
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenDataset(const std::filesystem::path& folder,
                                                          const SourceOptions& options) {
-  if (const absl::Status status = CheckFolder(folder); !status.ok()) return status;
-  absl::StatusOr<std::vector<ImageEntry>> entries = LoadImageList(folder / "rgb.txt");
-  if (!entries.ok()) return entries.status();
-  const std::uint64_t count = entries->size();
+  absl::StatusOr<DatasetLayout> layout = ReadDatasetLayout(folder, options);
+  if (!layout.ok()) return layout.status();
+  const std::uint64_t count = layout->entries.size();
   const std::uint64_t end = std::min(options.end_frame.value_or(count), count);
   if (options.first_frame >= end) {
     return absl::InvalidArgumentError(absl::StrCat("frames ", options.first_frame, ":",
                                                    options.end_frame.value_or(count), " is empty; ",
                                                    folder.string(), " has frames 0:", count));
   }
-  const absl::StatusOr<CameraIntrinsics> camera =
-      LoadCamera(options.camera_file.empty() ? folder / "camera.yaml" : options.camera_file,
-                 [&] { return SizeOfFirstPicture(folder, *entries, options.first_frame); });
-  if (!camera.ok()) return camera.status();
-
   SourceInfo info;
   info.uri = absl::StrCat("dataset:", folder.string());
-  info.camera = std::make_shared<const CameraModel>(*camera);
+  info.remark = layout->remark;
+  if (!info.remark.empty()) Log(absl::StrCat("source ", info.uri, ": ", info.remark));
+  info.camera = std::make_shared<const CameraModel>(layout->camera);
   info.frame_count = end - options.first_frame;
   if (const absl::Status status = ReadFacts(folder, options.first_frame, &info); !status.ok()) {
     return status;
   }
-  TellPauses(folder / "rgb.txt", *entries, options.first_frame, end);
-  FrameDecoder decoder(folder, *std::move(entries), info.camera);
+  TellPauses(layout->list, layout->entries, options.first_frame, end);
+  FrameDecoder decoder(layout->pictures, std::move(layout->entries), info.camera,
+                       layout->camera_file);
   if (const absl::Status status = CheckFirstPicture(decoder, options.first_frame, end);
       !status.ok()) {
     return status;
@@ -283,6 +268,19 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenDataset(const std::filesystem::
   }
   return std::make_unique<EveryFrameSource>(std::move(info), std::move(decoder),
                                             options.first_frame, end);
+}
+
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenDatasetUri(absl::string_view rest,
+                                                            const SourceOptions& options) {
+  const std::filesystem::path whole{std::string(rest)};
+  if (rest.find('?') == absl::string_view::npos || MayExist(whole)) {
+    return OpenDataset(whole, options);  // also a folder with a question mark in its name
+  }
+  UriQuery query("dataset:", rest);
+  SourceOptions with_rate = options;
+  if (const std::optional<double> fps = query.Number("fps", 0.1, 1000)) with_rate.fps = fps;
+  if (const absl::Status status = query.Finish("fps"); !status.ok()) return status;
+  return OpenDataset(query.path(), with_rate);
 }
 
 }  // namespace saccade

@@ -17,8 +17,11 @@ constexpr std::size_t kReadAheadBytes = std::size_t{64} << 20;
 }  // namespace
 
 FrameDecoder::FrameDecoder(std::filesystem::path folder, std::vector<ImageEntry> entries,
-                           std::shared_ptr<const CameraModel> camera)
-    : folder_(std::move(folder)), entries_(std::move(entries)), camera_(std::move(camera)) {}
+                           std::shared_ptr<const CameraModel> camera, std::string camera_file)
+    : folder_(std::move(folder)),
+      entries_(std::move(entries)),
+      camera_(std::move(camera)),
+      camera_file_(std::move(camera_file)) {}
 
 absl::StatusOr<Frame> FrameDecoder::Decode(std::size_t index) const {
   const ImageEntry& entry = entries_[index];
@@ -48,7 +51,7 @@ std::size_t FrameDecoder::read_ahead() const {
 absl::Status FrameDecoder::CheckSize(cv::Size size) const {
   if (size.width == camera_->width() && size.height == camera_->height()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
-      "is ", size.width, "x", size.height, " but camera.yaml says ", camera_->width(), "x",
+      "is ", size.width, "x", size.height, " but ", camera_file_, " says ", camera_->width(), "x",
       camera_->height(), "; correct width and height (and fx, fy, cx, cy with them): ",
       SizeRemedy(camera_->intrinsics(), size)));
 }

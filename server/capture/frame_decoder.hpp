@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <string>
 #include <vector>
 
 #include "server/capture/frame.hpp"
@@ -18,7 +19,7 @@ namespace saccade {
 class FrameDecoder {
  public:
   FrameDecoder(std::filesystem::path folder, std::vector<ImageEntry> entries,
-               std::shared_ptr<const CameraModel> camera);
+               std::shared_ptr<const CameraModel> camera, std::string camera_file = "camera.yaml");
 
   const std::vector<ImageEntry>& entries() const { return entries_; }
 
@@ -34,6 +35,7 @@ class FrameDecoder {
   std::filesystem::path folder_;
   std::vector<ImageEntry> entries_;
   std::shared_ptr<const CameraModel> camera_;
+  std::string camera_file_;  // for messages
 };
 
 }  // namespace saccade

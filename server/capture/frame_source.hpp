@@ -17,6 +17,8 @@ namespace saccade {
 /// Facts about a source that are known before its first frame.
 struct SourceInfo {
   std::string uri;
+  /// What people should know of it, in a few words, e.g. of a lens that is assumed; mostly empty.
+  std::string remark;
   std::shared_ptr<const CameraModel> camera;
   std::optional<Target> target;    // known points, if the place has them
   std::optional<StartPose> start;  // nominal first pose
@@ -36,6 +38,8 @@ class FrameSource {
   /// left.
   virtual absl::StatusOr<std::optional<Frame>> Next() = 0;
   virtual std::uint64_t bad_frames() const = 0;
+  /// Frames of a live source that came, or should have come, and that nobody will see.
+  virtual std::uint64_t dropped_frames() const { return 0; }
   /// Makes a Next() that waits for its time return nothing at once, and every later one. Any
   /// thread.
   virtual void Stop() {}

@@ -93,7 +93,9 @@ absl::StatusOr<Picture> Decode(Bytes bytes) {
   return picture;
 }
 
-absl::StatusOr<Picture> CheckAndDecode(Bytes bytes, const SizeCheck& check) {
+}  // namespace
+
+absl::StatusOr<Picture> DecodePicture(Bytes bytes, const SizeCheck& check) {
   if (const absl::Status whole = CheckWhole(bytes); !whole.ok()) return whole;
   const absl::StatusOr<cv::Size> size = ReadPictureSize(bytes);
   if (!size.ok()) return size.status();
@@ -107,8 +109,6 @@ absl::StatusOr<Picture> CheckAndDecode(Bytes bytes, const SizeCheck& check) {
   }
 }
 
-}  // namespace
-
 absl::StatusOr<Picture> LoadPicture(const std::filesystem::path& file, const SizeCheck& check) {
   const absl::StatusOr<std::string> bytes = ReadRegularFile(file, kMaxBytes, "a picture");
   if (absl::IsNotFound(bytes.status()) || absl::IsResourceExhausted(bytes.status())) {
@@ -116,7 +116,7 @@ absl::StatusOr<Picture> LoadPicture(const std::filesystem::path& file, const Siz
   }
   if (!bytes.ok()) return absl::DataLossError(bytes.status().message());
   absl::StatusOr<Picture> picture =
-      CheckAndDecode({reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()}, check);
+      DecodePicture({reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()}, check);
   if (picture.ok()) return picture;
   return absl::Status(picture.status().code(),
                       absl::StrCat(file.string(), ": ", picture.status().message()));

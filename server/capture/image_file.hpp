@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <opencv2/core.hpp>
+#include <span>
 
 namespace saccade {
 
@@ -34,5 +35,9 @@ using SizeCheck = std::function<absl::Status(cv::Size)>;
 ///   ResourceExhausted  no file descriptor is free: the file may be well, try again later
 absl::StatusOr<Picture> LoadPicture(const std::filesystem::path& file,
                                     const SizeCheck& check = nullptr);
+
+/// The same of bytes in memory. DataLoss.
+absl::StatusOr<Picture> DecodePicture(std::span<const std::uint8_t> bytes,
+                                      const SizeCheck& check = nullptr);
 
 }  // namespace saccade

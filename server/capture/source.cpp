@@ -4,6 +4,8 @@
 #include <absl/strings/str_join.h>
 
 #include "server/capture/dataset.hpp"
+#include "server/capture/v4l2/v4l2_source.hpp"
+#include "server/capture/video/video_source.hpp"
 
 namespace saccade {
 
@@ -32,8 +34,15 @@ absl::StatusOr<std::unique_ptr<FrameSource>> SourceRegistry::Open(
 
 SourceRegistry CaptureSources() {
   SourceRegistry registry;
-  registry.Add("dataset", [](absl::string_view folder, const SourceOptions& options) {
-    return OpenDataset(std::filesystem::path(std::string(folder)), options);
+  registry.Add("dataset", OpenDatasetUri);
+  registry.Add("v4l2", [](absl::string_view rest, const SourceOptions& options) {
+    return OpenV4l2(rest, options);
+  });
+  registry.Add("file", [](absl::string_view rest, const SourceOptions& options) {
+    return OpenVideoFile(rest, options);
+  });
+  registry.Add("rtsp", [](absl::string_view rest, const SourceOptions& options) {
+    return OpenRtsp(rest, options);
   });
   return registry;
 }

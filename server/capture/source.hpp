@@ -21,6 +21,7 @@ struct SourceOptions {
   std::optional<std::uint64_t> end_frame;  // ... to before B; beyond the end means the end
   bool realtime = false;              // pace by time stamps, drop frames when the reader is late
   std::filesystem::path camera_file;  // `--camera`: instead of the source's own camera.yaml
+  std::optional<double> fps = {};     // of pictures or a video that have no time stamps
 };
 
 /// Opens sources by the scheme of their URI ("dataset:DIR"). Programs add the schemes they link.

@@ -43,6 +43,7 @@ absl::Status RunCommand(const RunArguments& arguments) {
   SourceOptions options;
   options.first_frame = range->first;
   options.end_frame = range->end;
+  if (arguments.fps > 0) options.fps = arguments.fps;
   auto opened = OpenDataset(arguments.dataset, options);
   if (!opened.ok()) return opened.status();
   const std::unique_ptr<FrameSource> source = Altered(*std::move(opened), *std::move(alterations));

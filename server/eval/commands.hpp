@@ -22,6 +22,7 @@ struct RunArguments {
   std::vector<std::string> drop;  // A:B each
   std::uint64_t every = 1;
   std::string freeze;  // K:SECONDS, empty for none
+  double fps = 0;      // of pictures without time stamps; 0: not given
   bool json = false;
 };
 struct ScoreArguments {
@@ -42,6 +43,8 @@ struct SimArguments {
 struct RenderArguments {
   std::string source, frames;  // sim:desk?..., A:B
   std::filesystem::path out;
+  std::filesystem::path camera;  // record: instead of the source's own camera.yaml
+  double seconds = 0;            // record: end after so long; 0: with the source
 };
 struct PoseGraphArguments {
   std::filesystem::path in, out;
@@ -58,6 +61,8 @@ absl::Status SimCommand(const SimArguments& arguments);
 absl::Status RenderCommand(const RenderArguments& arguments);
 /// Writes a simulated source as a recording in TUM layout, noise and all: rgb/, rgb.txt,
 /// camera.yaml and groundtruth.txt. It names no target, so it starts as a recording of a room does.
+absl::Status RecordSimulator(const RenderArguments& arguments);
+/// Writes any source as a recording in TUM layout (RecordSource), a simulated one with its truth.
 absl::Status RecordCommand(const RenderArguments& arguments);
 /// Optimises a pose graph in g2o's form and prints its cost before and after.
 absl::Status PoseGraphCommand(const PoseGraphArguments& arguments);

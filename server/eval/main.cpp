@@ -49,7 +49,12 @@ CLI::Validator NotNegative() {
 
 void AddRun(CLI::App& app, RunArguments& arguments) {
   CLI::App* run = app.add_subcommand("run", "Track a recording and score it");
-  run->add_option("--dataset", arguments.dataset, "Folder in TUM layout")->required();
+  run->add_option("--dataset", arguments.dataset,
+                  "Folder in TUM or EuRoC layout, or of pictures with --fps")
+      ->required();
+  run->add_option("--fps", arguments.fps, "Pictures a second, where there are no time stamps")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->check(Finite());
   run->add_option("--out", arguments.out, "Folder for trajectory.tum, frames.csv and report.json")
       ->required();
   run->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
@@ -116,11 +121,18 @@ void AddRender(CLI::App& app, RenderArguments& arguments) {
 }
 
 void AddRecord(CLI::App& app, RenderArguments& arguments) {
-  CLI::App* record =
-      app.add_subcommand("record", "Write the simulator as a recording with ground truth");
-  record->add_option("--source", arguments.source, "sim:desk[?key=value&...]")->required();
+  CLI::App* record = app.add_subcommand(
+      "record", "Write a source as a recording; the simulator with ground truth");
+  record
+      ->add_option("--source", arguments.source,
+                   "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?key=value&...]")
+      ->required();
   record->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
   record->add_option("--out", arguments.out, "Folder in TUM layout to write")->required();
+  record->add_option("--camera", arguments.camera, "camera.yaml instead of the source's own");
+  record->add_option("--for", arguments.seconds, "End after so many seconds; else Ctrl-C does")
+      ->check(CLI::Range(0.01, 1e6))
+      ->check(Finite());
 }
 
 /// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell

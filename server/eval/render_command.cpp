@@ -1,11 +1,11 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <absl/strings/str_join.h>
 #include <absl/strings/strip.h>
 
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "server/capture/camera_yaml.hpp"
 #include "server/eval/commands.hpp"
 #include "server/eval/frame_range.hpp"
 #include "server/eval/output_file.hpp"
@@ -45,15 +45,6 @@ absl::Status WritePicture(const std::filesystem::path& file, const cv::Mat& pict
       absl::StrCat("--out ", file.string(), ": cannot be written; is the folder writable?"));
 }
 
-std::string CameraYaml(const CameraIntrinsics& camera) {
-  std::string text =
-      camera.model == LensModel::kPinhole ? "model: pinhole\n" : "model: brown_conrady\n";
-  absl::StrAppendFormat(&text, "width: %d\nheight: %d\nfx: %.9g\nfy: %.9g\ncx: %.9g\ncy: %.9g\n",
-                        camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy);
-  return text + absl::StrFormat("distortion: [%s]\nfps: %.9g\n",
-                                absl::StrJoin(camera.distortion, ", "), camera.fps);
-}
-
 }  // namespace
 
 absl::Status RenderCommand(const RenderArguments& arguments) {
@@ -71,7 +62,7 @@ absl::Status RenderCommand(const RenderArguments& arguments) {
   return absl::OkStatus();
 }
 
-absl::Status RecordCommand(const RenderArguments& arguments) {
+absl::Status RecordSimulator(const RenderArguments& arguments) {
   absl::StatusOr<SimFrames> frames = OpenFrames(arguments);
   if (!frames.ok()) return frames.status();
   const std::filesystem::path& out = arguments.out;

@@ -57,6 +57,9 @@ const std::vector<Home>& Homes() {
       {"ft2build.h", {"server/overlay"}},
       {"fribidi.h", {"server/overlay"}},
       {"fontconfig/", {"server/overlay"}},
+      {"libavformat/", {"server/capture"}},
+      {"libavcodec/", {"server/capture"}},
+      {"seccomp.h", {"server/capture"}},
       {"opencv2/videoio", {}},
       {"opencv2/highgui", {}},
   };

@@ -45,7 +45,7 @@ absl::Status CameraDraft::Error(absl::string_view field, absl::string_view probl
   return absl::InvalidArgumentError(Words(field, problem));
 }
 
-std::string CameraYaml(const CameraDraft& draft) {
+std::string CameraLine(const CameraDraft& draft) {
   const CameraIntrinsics& lens = draft.lens;
   const bool focal = lens.fx != 0.0;
   const LensName& name = LensOf(lens.model);
@@ -72,11 +72,11 @@ std::string CameraYaml(const CameraDraft& draft) {
   return text + "}";
 }
 
-std::string CameraYaml(const CameraIntrinsics& lens) {
+std::string CameraLine(const CameraIntrinsics& lens) {
   CameraDraft draft;
   draft.lens = lens;
   draft.told_lens = true;
-  return CameraYaml(draft);
+  return CameraLine(draft);
 }
 
 }  // namespace saccade

@@ -42,7 +42,7 @@ struct CameraDraft {
 
 /// The whole of camera.yaml in one line that can be saved as such: `{model: pinhole, width: ...}`.
 /// What is not known is `?`.
-std::string CameraYaml(const CameraDraft& draft);
-std::string CameraYaml(const CameraIntrinsics& lens);
+std::string CameraLine(const CameraDraft& draft);
+std::string CameraLine(const CameraIntrinsics& lens);
 
 }  // namespace saccade

@@ -92,7 +92,7 @@ std::string SizeRemedy(const CameraIntrinsics& lens, cv::Size size) {
   const double aspect = static_cast<double>(lens.width) / lens.height;
   const double theirs = static_cast<double>(size.width) / size.height;
   if (Near(theirs, aspect, 0.02)) {
-    return absl::StrCat("if the pictures were scaled, write ", CameraYaml(Scaled(lens, size)));
+    return absl::StrCat("if the pictures were scaled, write ", CameraLine(Scaled(lens, size)));
   }
   if (Near(1.0 / theirs, aspect, 0.02)) {
     return "the pictures stand where the file's lie: turn them, or calibrate them as they are";
@@ -171,7 +171,7 @@ absl::Status CheckCentre(const CameraDraft& draft, std::vector<std::string>& war
         "cx", absl::StrCat(lens.cx, ", ", lens.cy, " is the middle of a picture of about ",
                            size.width, " x ", size.height, " px, not of ", lens.width, " x ",
                            lens.height, ": write that size, or, if the pictures were scaled, ",
-                           CameraYaml(Scaled(theirs, {lens.width, lens.height}))));
+                           CameraLine(Scaled(theirs, {lens.width, lens.height}))));
   }
   for (const auto& [field, share, c] :
        {std::tuple("cx", a, lens.cx), std::tuple("cy", b, lens.cy)}) {

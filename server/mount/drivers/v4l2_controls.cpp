@@ -2,32 +2,13 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <fcntl.h>
 #include <linux/videodev2.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 
 namespace saccade {
 namespace {
-
-class RealVideoDevice final : public VideoDevice {
- public:
-  explicit RealVideoDevice(int file) : file_(file) {}
-  ~RealVideoDevice() override { close(file_); }
-  int Ioctl(unsigned long request, void* argument) override {
-    int result = 0;
-    do {
-      result = ioctl(file_, request, argument);
-    } while (result != 0 && errno == EINTR);
-    return result == 0 ? 0 : errno;
-  }
-
- private:
-  const int file_;
-};
 
 std::string ControlName(std::uint32_t id) {
   switch (id) {
@@ -51,20 +32,6 @@ std::string ControlName(std::uint32_t id) {
 }
 
 }  // namespace
-
-absl::StatusOr<std::unique_ptr<VideoDevice>> OpenRealVideoDevice(const std::string& path) {
-  const int file = open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  if (file >= 0) return std::make_unique<RealVideoDevice>(file);
-  if (errno == ENOENT || errno == ENODEV || errno == ENXIO) {
-    return absl::NotFoundError(absl::StrCat(path, ": no such device; plug the camera in"));
-  }
-  if (errno == EACCES) {
-    return absl::PermissionDeniedError(
-        absl::StrCat(path, ": may not be opened; add the user to the group that owns it (video)"));
-  }
-  return absl::UnavailableError(
-      absl::StrCat(path, ": cannot be opened (", std::strerror(errno), "); is it a camera?"));
-}
 
 absl::Status V4l2Controls::Problem(int error, std::uint32_t id, const char* what) const {
   if (error == ENODEV || error == ENXIO || error == EIO || error == EBADF) {

@@ -4,27 +4,14 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "shared/io/video_device.hpp"
+
 namespace saccade {
-
-/// ioctl() on one opened video device: all that the driver asks of the system, so that tests can
-/// stand in for it.
-class VideoDevice {
- public:
-  virtual ~VideoDevice() = default;
-  /// 0, or errno.
-  virtual int Ioctl(unsigned long request, void* argument) = 0;
-};
-using OpenVideoDevice =
-    std::function<absl::StatusOr<std::unique_ptr<VideoDevice>>(const std::string& path)>;
-
-/// The real one. NotFound, PermissionDenied, Unavailable: names device and remedy.
-absl::StatusOr<std::unique_ptr<VideoDevice>> OpenRealVideoDevice(const std::string& path);
 
 /// Controls of one V4L2 device, by their V4L2_CID_ numbers. One thread. Errors name device and
 /// control: Unavailable, the device is gone; FailedPrecondition, it refuses.

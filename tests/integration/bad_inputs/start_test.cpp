@@ -55,6 +55,25 @@ TEST_F(BadDataSet, ListIsRefusedWithFileLineAndRemedy) {
   }
 }
 
+TEST_F(BadDataSet, CamerasVideosAndFoldersAreRefusedWithWhatToDo) {
+  const auto refuse = [&](const std::string& input, const std::string& source,
+                          const std::string& part) {
+    ExpectRefusedStart(input, {"--source", source, "--data-dir", folder_ / "data"}, 1, part);
+  };
+  WriteText(fs::path(folder_.path()) / "words.mp4", "no video");
+  fs::create_directory(fs::path(folder_.path()) / "shots");
+  WriteSmallDataset(folder_ / "set", {.frames = 1});
+  fs::copy_file(folder_ / "set/rgb/0.000000.png", folder_ / "shots/1.png");
+  refuse("camera: not there", "v4l2:/dev/no-such-camera", "plug the camera in");
+  refuse("camera: /dev/null", "v4l2:/dev/null", "is no V4L2 device");
+  refuse("camera: unknown option", "v4l2:/dev/null?zoom=3", "zoom is not known");
+  refuse("video: not there", "file:" + (folder_ / "none.mp4"), "No such file");
+  refuse("video: a text", "file:" + (folder_ / "words.mp4"), "it is no video that is read here");
+  refuse("video: /dev/zero", "file:/dev/zero", "is no regular file");
+  refuse("stream: nobody there", "rtsp://127.0.0.1:1/cam", "is the address right?");
+  refuse("pictures without times", "dataset:" + (folder_ / "shots"), "?fps=30");
+}
+
 TEST_F(BadDataSet, CameraIsRefusedWithFieldAndRemedy) {
   const auto refuse = [&](const std::string& input, const std::string& part,
                           const std::string& text) {

@@ -46,6 +46,23 @@ TEST(CommandLineAlone, SaysThatNoServerAnswersAndWhatToDo) {
   EXPECT_THAT(result.err, HasSubstr("--server HOST:PORT"));
 }
 
+TEST(CommandLineAlone, ListsTheCamerasOfThisMachineWithoutAServer) {
+  TemporaryFolder folder;
+  const RunResult text = Saccade({"--server", "127.0.0.1:1", "cameras"}, folder.path());
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  const RunResult result = Saccade({"cameras", "--json"}, folder.path());
+  const json cameras = json::parse(result.out, nullptr, /*allow_exceptions=*/false);
+  ASSERT_TRUE(cameras["cameras"].is_array()) << result.out;
+  bool any = false;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev")) {
+    any = any || entry.path().filename().string().rfind("video", 0) == 0;
+  }
+  EXPECT_EQ(cameras["cameras"].empty(), !any);
+  if (!any) {
+    EXPECT_THAT(text.out, HasSubstr("no camera is there"));
+  }
+}
+
 class CommandLine : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {

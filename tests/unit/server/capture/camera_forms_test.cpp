@@ -124,7 +124,7 @@ TEST_F(CameraForms, TheConversionThatIsShownIsACameraFileOfTheSameCamera) {
                           .fps = 29.97,
                           .rolling_shutter_readout_s = 0.018};
     if (model != LensModel::kPinhole) lens.distortion[0] = 0.01234567891;
-    const auto again = Read(CameraYaml(lens));
+    const auto again = Read(CameraLine(lens));
     Expect(again, model, 640, 480, {517.306408, 516.469215, 318.643040, 255.313989},
            lens.distortion);
     EXPECT_EQ(again->fps, 29.97);

@@ -1,0 +1,195 @@
+#include "server/capture/video/decoder_process.hpp"
+
+#include <absl/strings/str_cat.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include "shared/io/log.hpp"
+
+namespace saccade {
+namespace {
+
+constexpr int kLookForStop_ms = 100;
+constexpr std::chrono::milliseconds kMostBytesTake(5'000);
+constexpr std::size_t kMostText = 4'000;
+constexpr int kPipeBytes = 1 << 20;
+
+absl::StatusOr<int> OpenVideoFile(const std::filesystem::path& file) {
+  // Not to wait for whoever writes into a pipe.
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) {
+    const std::string words = absl::StrCat(file.string(), ": ", std::strerror(errno),
+                                           "; give a video file that may be read");
+    if (errno == EMFILE || errno == ENFILE) return absl::ResourceExhaustedError(words);
+    return errno == ENOENT ? absl::NotFoundError(words) : absl::PermissionDeniedError(words);
+  }
+  struct stat is {};
+  if (fstat(descriptor, &is) == 0 && S_ISREG(is.st_mode)) return descriptor;
+  close(descriptor);
+  return absl::InvalidArgumentError(
+      absl::StrCat(file.string(), ": is no regular file; give a video file"));
+}
+
+std::filesystem::path DecoderProgram() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  return self.parent_path() / "saccade-decode";
+}
+
+/// posix_spawn with these three streams and no other descriptor. errno, or 0.
+int Spawn(const std::filesystem::path& program, const std::vector<std::string>& words, int in,
+          int out, pid_t* pid) {
+  std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  if (in >= 0) {
+    posix_spawn_file_actions_adddup2(&actions, in, STDIN_FILENO);
+  } else {
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  }
+  posix_spawn_file_actions_adddup2(&actions, out, STDOUT_FILENO);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none, defaults;
+  sigemptyset(&none);
+  sigfillset(&defaults);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &defaults);
+  posix_spawnattr_setpgroup(&attributes, 0);  // Ctrl-C is the parent's to hear
+  posix_spawnattr_setflags(&attributes,
+                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  char* const no_environment[] = {nullptr};
+  const int error =
+      posix_spawn(pid, program.c_str(), &actions, &attributes, argv.data(), no_environment);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::Start(const VideoInput& input,
+                                                                      std::int64_t after_ns) {
+  int file = -1;
+  if (!input.file.empty()) {
+    const absl::StatusOr<int> opened = OpenVideoFile(input.file);
+    if (!opened.ok()) return opened.status();
+    file = *opened;
+  }
+  std::vector<std::string> words = {"saccade-decode", "--after", absl::StrCat(after_ns)};
+  if (file < 0) words.insert(words.end(), {"--url", input.url});
+  const std::filesystem::path program = DecoderProgram();
+  int ends[2] = {-1, -1};
+  pid_t pid = -1;
+  int error = pipe2(ends, O_CLOEXEC) == 0 ? 0 : errno;
+  if (error == 0) {
+    (void)fcntl(ends[1], F_SETPIPE_SZ, kPipeBytes);
+    error = Spawn(program, words, file, ends[1], &pid);
+    close(ends[1]);
+    if (error != 0) close(ends[0]);
+  }
+  if (file >= 0) close(file);
+  if (error == 0) return std::unique_ptr<DecoderProcess>(new DecoderProcess(pid, ends[0]));
+  const std::string text =
+      absl::StrCat(program.string(), ": cannot be started (", std::strerror(error), ")");
+  if (error == ENOENT) {
+    return absl::NotFoundError(
+        absl::StrCat(text, "; videos are decoded by it: install it beside this program"));
+  }
+  return absl::ResourceExhaustedError(text);
+}
+
+DecoderProcess::~DecoderProcess() {
+  if (!reaped_) {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  close(pipe_);
+}
+
+absl::Status DecoderProcess::Death() {
+  int status = 0;
+  bool known = false;
+  for (int i = 0; i < 100 && !known; ++i) {  // its pipe closes a little before it is gone
+    known = waitpid(pid_, &status, WNOHANG) == pid_;
+    if (!known) poll(nullptr, 0, 1);
+  }
+  const bool killed = known;  // by others, if at all
+  if (!known) {               // it lives on with its pipe closed
+    kill(pid_, SIGKILL);
+    known = waitpid(pid_, &status, 0) == pid_;
+  }
+  reaped_ = true;
+  const int signal = known && WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  if (killed && (signal == SIGKILL || signal == SIGTERM)) {
+    return absl::AbortedError(absl::StrCat("the decoder was killed by signal ", signal));
+  }
+  if (known && WIFSIGNALED(status)) {
+    return absl::UnavailableError(absl::StrCat("the decoder died of signal ", WTERMSIG(status)));
+  }
+  return absl::UnavailableError(
+      absl::StrCat("the decoder ended with ", known ? WEXITSTATUS(status) : -1));
+}
+
+absl::Status DecoderProcess::Read(void* out, std::size_t size, const std::function<bool()>& stopped,
+                                  std::chrono::milliseconds most) {
+  char* at = static_cast<char*>(out);
+  const auto end = std::chrono::steady_clock::now() + most;
+  while (size > 0) {
+    pollfd wait_for{pipe_, POLLIN, 0};
+    const int ready = poll(&wait_for, 1, kLookForStop_ms);
+    if (stopped()) return absl::CancelledError("");
+    if (ready <= 0) {
+      if (std::chrono::steady_clock::now() > end) {
+        return absl::DeadlineExceededError("the decoder has said nothing for too long");
+      }
+      continue;
+    }
+    const ssize_t got = read(pipe_, at, size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return Death();
+    at += got;
+    size -= static_cast<std::size_t>(got);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<DecodeHeader> DecoderProcess::ReadHeader(const std::function<bool()>& stopped,
+                                                        std::chrono::milliseconds most) {
+  DecodeHeader header;
+  if (absl::Status read = Read(&header, sizeof header, stopped, most); !read.ok()) return read;
+  if (header.magic != DecodeHeader::kMagic) {
+    return absl::UnavailableError("the decoder writes nonsense; is it of this version?");
+  }
+  return header;
+}
+
+absl::Status DecoderProcess::ReadBytes(void* out, std::size_t size,
+                                       const std::function<bool()>& stopped) {
+  return Read(out, size, stopped, kMostBytesTake);
+}
+
+absl::StatusOr<std::string> DecoderProcess::ReadText(const DecodeHeader& header,
+                                                     const std::function<bool()>& stopped) {
+  if (header.size > kMostText) return absl::UnavailableError("the decoder writes nonsense");
+  std::string text(header.size, '\0');
+  if (absl::Status read = ReadBytes(text.data(), text.size(), stopped); !read.ok()) return read;
+  return Printable(text);
+}
+
+}  // namespace saccade
