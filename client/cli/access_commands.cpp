@@ -26,22 +26,18 @@ constexpr std::size_t kMaxPemBytes = 64 * 1024;
 /// "90s", "30m", "8h", "7d" in seconds; nothing: not of that form.
 std::optional<std::uint32_t> ParseLife(absl::string_view text) {
   if (text.size() < 2) return std::nullopt;
-  std::uint32_t number = 0;
-  if (!absl::SimpleAtoi(text.substr(0, text.size() - 1), &number) || number > 100'000'000) {
+  constexpr std::uint64_t kMost_s = 366 * 86'400;
+  std::uint64_t number = 0;
+  if (!absl::SimpleAtoi(text.substr(0, text.size() - 1), &number) || number > kMost_s) {
     return std::nullopt;
   }
-  switch (text.back()) {
-    case 's':
-      return number;
-    case 'm':
-      return number * 60;
-    case 'h':
-      return number * 3600;
-    case 'd':
-      return number <= 366 ? std::optional(number * 86'400) : std::nullopt;
-    default:
-      return std::nullopt;
-  }
+  const std::uint64_t unit_s = text.back() == 's'   ? 1
+                               : text.back() == 'm' ? 60
+                               : text.back() == 'h' ? 3600
+                               : text.back() == 'd' ? 86'400
+                                                    : 0;
+  if (unit_s == 0 || number * unit_s > kMost_s) return std::nullopt;
+  return static_cast<std::uint32_t>(number * unit_s);
 }
 
 CLI::Validator Life() {
@@ -96,6 +92,8 @@ absl::Status RunTrust(const Options& options) {
     root = net::FetchRoot(options.from);
     if (!root.ok()) return root.status();
   }
+  root = net::OneRoot(*root);
+  if (!root.ok()) return root.status();
   const absl::StatusOr<std::string> fingerprint = net::Fingerprint(*root);
   if (!fingerprint.ok()) return fingerprint.status();
   if (!options.out.empty()) {

@@ -3,6 +3,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -23,7 +24,10 @@ constexpr std::size_t kMaxFileBytes = 256 * 1024;
 /// Nothing where it is not there, not this user's alone, or makes no sense.
 std::optional<KeptAccess> Load(const fs::path& file) {
   struct stat facts {};
-  if (::stat(file.c_str(), &facts) != 0 || (facts.st_mode & 077) != 0) return std::nullopt;
+  if (::stat(file.c_str(), &facts) != 0 || (facts.st_mode & 077) != 0 ||
+      facts.st_uid != ::geteuid()) {
+    return std::nullopt;
+  }
   const absl::StatusOr<std::string> text = ReadRegularFile(file, kMaxFileBytes, "an access file");
   if (!text.ok()) return std::nullopt;
   const nlohmann::json json = nlohmann::json::parse(*text, nullptr, /*allow_exceptions=*/false);
@@ -32,7 +36,7 @@ std::optional<KeptAccess> Load(const fs::path& file) {
   };
   if (!json.is_object() || word("grpc").empty()) return std::nullopt;
   const bool tls = json.contains("tls") && json["tls"].is_boolean() && json["tls"].get<bool>();
-  return KeptAccess{word("grpc"), tls, word("root"), word("token")};
+  return KeptAccess{word("grpc"), tls, word("root"), word("token"), word("name")};
 }
 
 /// Beside the sessions: one a server. Empty: nowhere.
@@ -64,6 +68,7 @@ void Apply(KeptAccess kept, net::ConnectionOptions& to) {
   to.tls = kept.tls;
   to.root_pem = std::move(kept.root_pem);
   to.token = std::move(kept.token);
+  to.tls_name = std::move(kept.name);
 }
 
 }  // namespace
@@ -73,10 +78,13 @@ fs::path DefaultDataDir() {
     return fs::path(data) / "saccade";
   }
   const char* home = std::getenv("HOME");
-  return fs::path(home != nullptr ? home : "/tmp") / ".local/share/saccade";
+  return home == nullptr || *home == 0 ? fs::path() : fs::path(home) / ".local/share/saccade";
 }
 
 absl::StatusOr<KeptAccess> LoadOwner(const fs::path& data_dir) {
+  if (data_dir.empty()) {
+    return absl::NotFoundError("no data folder: HOME is not set; give --data-dir");
+  }
   const fs::path file = data_dir / "owner.json";
   if (std::optional<KeptAccess> owner = Load(file)) return *std::move(owner);
   return absl::NotFoundError(
@@ -115,7 +123,7 @@ absl::Status ResolveAccess(Options& options) {
   const absl::StatusOr<net::Pass> pass = net::AccessClient(to).Redeem(options.invite);
   if (!pass.ok()) return pass.status();
   to.token = pass->token;
-  return Keep({to.server, to.tls, to.root_pem, to.token});
+  return Keep({to.server, to.tls, to.root_pem, to.token, ""});
 }
 
 }  // namespace saccade::cli

@@ -17,6 +17,7 @@ struct KeptAccess {
   bool tls = false;
   std::string root_pem;  // empty: the system's store
   std::string token;     // empty: none
+  std::string name;      // that its certificate has, where it is not `server`'s host
 };
 
 /// Of the server that this user runs with that data folder: DATA_DIR/owner.json.

@@ -46,7 +46,9 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ConnectionOptions& options) {
   }
   grpc::SslCredentialsOptions tls;
   tls.pem_root_certs = options.root_pem;  // empty: the system's store
-  return grpc::CreateCustomChannel(options.server, grpc::SslCredentials(tls), ChannelArguments());
+  grpc::ChannelArguments arguments = ChannelArguments();
+  if (!options.tls_name.empty()) arguments.SetSslTargetNameOverride(options.tls_name);
+  return grpc::CreateCustomChannel(options.server, grpc::SslCredentials(tls), arguments);
 }
 
 void Authorise(const ConnectionOptions& options, grpc::ClientContext& context) {

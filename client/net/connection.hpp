@@ -30,6 +30,8 @@ struct ConnectionOptions {
   /// TLS, with `root_pem` for whom to trust; empty: the system's store. False: plain.
   bool tls = false;
   std::string root_pem;
+  /// The name that the certificate must have; empty: `server`'s host.
+  std::string tls_name;
   /// What the server lets in by (AccessClient::Redeem); secret. Empty: none.
   std::string token;
 

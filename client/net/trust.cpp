@@ -7,6 +7,7 @@
 #include <absl/strings/strip.h>
 #include <netdb.h>
 #include <openssl/bio.h>
+#include <openssl/err.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
@@ -103,7 +104,31 @@ absl::StatusOr<std::string> FetchRoot(const std::string& address) {
         " offers no root: the server there has no authority of its own (it has a given "
         "certificate, or speaks plain HTTP), or is not Saccade's HTTP port"));
   }
-  return pem;
+  return OneRoot(pem);
+}
+
+absl::StatusOr<std::string> OneRoot(const std::string& pem) {
+  const std::unique_ptr<BIO, int (*)(BIO*)> text(
+      BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size())), BIO_free);
+  const std::unique_ptr<BIO, int (*)(BIO*)> clean(BIO_new(BIO_s_mem()), BIO_free);
+  const auto read = [&text] {
+    return std::unique_ptr<X509, void (*)(X509*)>(
+        PEM_read_bio_X509(text.get(), nullptr, nullptr, nullptr), X509_free);
+  };
+  const auto root = read();
+  if (root == nullptr) return absl::InvalidArgumentError("holds no certificate (PEM)");
+  if (read() != nullptr) {
+    return absl::InvalidArgumentError(
+        "holds more than one certificate, of which only the first has that fingerprint: do not "
+        "trust it");
+  }
+  ERR_clear_error();
+  if (PEM_write_bio_X509(clean.get(), root.get()) != 1) {
+    return absl::InternalError("the certificate cannot be written");
+  }
+  char* bytes = nullptr;
+  const long size = BIO_get_mem_data(clean.get(), &bytes);
+  return std::string(bytes, static_cast<std::size_t>(size));
 }
 
 absl::StatusOr<std::string> Fingerprint(const std::string& pem) {

@@ -13,6 +13,10 @@ namespace saccade::net {
 ///   NotFound         the server there has no authority of its own
 absl::StatusOr<std::string> FetchRoot(const std::string& address);
 
+/// The one certificate of a PEM text, and nothing else of it: what is trusted is what was compared.
+/// InvalidArgument: there is none, or more than one.
+absl::StatusOr<std::string> OneRoot(const std::string& pem);
+
 /// SHA-256 of the first certificate of a PEM text, "AB:CD:..."; InvalidArgument: there is none.
 absl::StatusOr<std::string> Fingerprint(const std::string& pem);
 

@@ -58,6 +58,14 @@ std::string HostOfUrl(absl::string_view url) {
   return std::string(url.substr(0, port));
 }
 
+/// Empty: it has none.
+std::string GivenName(const ServerIdentity& identity) {
+  const absl::StatusOr<CertificateFacts> facts = InspectCertificate(identity.chain_pem);
+  if (!facts.ok()) return "";
+  if (!facts->names.dns.empty()) return facts->names.dns.front();
+  return facts->names.addresses.empty() ? "" : facts->names.addresses.front();
+}
+
 absl::StatusOr<Issued> CreateNow(AccessBook& book, const InviteDraft& draft) {
   const auto made = std::make_shared<std::promise<absl::StatusOr<Issued>>>();
   std::future<absl::StatusOr<Issued>> answer = made->get_future();
@@ -74,9 +82,11 @@ absl::StatusOr<Issued> CreateNow(AccessBook& book, const InviteDraft& draft) {
 absl::StatusOr<std::unique_ptr<FrontDoor>> FrontDoor::Open(const ServerConfig& config) {
   std::unique_ptr<FrontDoor> door(new FrontDoor(config));
   if (config.WantsTls(config.grpc) || config.WantsTls(config.http)) {
+    ServerNames names = ServerNames::OfThisMachine();
+    if (!config.public_url.empty()) names.Add(HostOfUrl(config.public_url));
     absl::StatusOr<ServerIdentity> identity =
         config.tls_certificate.empty()
-            ? EnsureServerIdentity(config.data_dir, ServerNames::OfThisMachine(), NowUnix_s())
+            ? EnsureServerIdentity(config.data_dir, names, NowUnix_s())
             : LoadServerIdentity(config.tls_certificate, config.tls_key, NowUnix_s());
     if (!identity.ok()) return identity.status();
     const absl::StatusOr<CertificateFacts> facts = InspectCertificate(identity->chain_pem);
@@ -127,9 +137,14 @@ absl::Status FrontDoor::Announce(int grpc_port, int http_port) {
         "network sees and changes everything");
   }
   if (!config_.auth_required) return absl::OkStatus();
+  // A given certificate has no name like 127.0.0.1, and perhaps an authority that is not public:
+  // who can read this file trusts it as it is.
+  const bool given = identity_ && !config_.tls_certificate.empty();
+  const std::string root = !identity_ ? "" : given ? identity_->chain_pem : identity_->root_pem;
   const nlohmann::json owner = {{"grpc", LocalAddress(config_.grpc, grpc_port)},
                                 {"tls", config_.WantsTls(config_.grpc)},
-                                {"root", identity_ ? identity_->root_pem : ""},
+                                {"root", root},
+                                {"name", given ? GivenName(*identity_) : ""},
                                 {"token", access_->owner_token()}};
   const std::filesystem::path file = config_.data_dir / "owner.json";
   if (const int failed = WritePrivateFile(file, owner.dump() + "\n"); failed != 0) {

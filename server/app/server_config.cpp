@@ -219,12 +219,14 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
   return absl::OkStatus();
 }
 
+/// Empty where nobody says where this user's files are.
 std::filesystem::path DefaultDataDir() {
   if (const char* data = std::getenv("XDG_DATA_HOME"); data != nullptr && *data != 0) {
     return std::filesystem::path(data) / "saccade";
   }
   const char* home = std::getenv("HOME");
-  return std::filesystem::path(home != nullptr ? home : "/tmp") / ".local/share/saccade";
+  if (home == nullptr || *home == 0) return {};  // not /tmp, which is everybody's
+  return std::filesystem::path(home) / ".local/share/saccade";
 }
 
 absl::Status CheckAddresses(const Raw& raw, ServerConfig& config) {
@@ -254,7 +256,16 @@ absl::Status CheckIdentity(const Raw& raw, ServerConfig& config) {
     return Bad("--insecure: says no TLS, and tls.* says TLS: leave one of them out");
   }
   config.tls_required = raw.tls_required;
-  config.auth_required = raw.auth_required || (!config.insecure && (config.beyond_loopback()));
+  // Who names a public address has a proxy before loopback: whom that brings is not of this
+  // machine.
+  config.auth_required =
+      raw.auth_required ||
+      (!config.insecure && (config.beyond_loopback() || !raw.public_url.empty()));
+  if (config.insecure && raw.auth_required && config.beyond_loopback()) {
+    return Bad(
+        "--insecure: invites would go over the network in plain text; leave auth.required "
+        "out, or --insecure");
+  }
   config.public_url = raw.public_url;
   absl::string_view trimmed = config.public_url;
   absl::ConsumeSuffix(&trimmed, "/");
@@ -274,6 +285,7 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   if (absl::Status mount = MountDrivers().Check(raw.mount, facts); !mount.ok()) return mount;
   config.mount = raw.mount;
   config.data_dir = raw.data_dir.empty() ? DefaultDataDir() : std::filesystem::path(raw.data_dir);
+  if (config.data_dir.empty()) return Bad("--data-dir is missing, and HOME is not set");
   config.camera_file = raw.camera;
   config.insecure = raw.insecure;
   if (absl::Status addresses = CheckAddresses(raw, config); !addresses.ok()) return addresses;

@@ -92,7 +92,8 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
 void SayReady(const ServerConfig& config, int grpc_port, int http_port) {
   const nlohmann::ordered_json ready = {{"event", "ready"},
                                         {"grpc", config.grpc.ToString(grpc_port)},
-                                        {"http", config.http.ToString(http_port)}};
+                                        {"http", config.http.ToString(http_port)},
+                                        {"tls", config.WantsTls(config.http)}};
   Announce(ready.dump());
 }
 
@@ -143,6 +144,8 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   gateway_options.port = config.http.port;
   gateway_options.web_root = WebRoot(config);
   gateway_options.allowed_hosts = (*door)->allowed_hosts();
+  // gRPC's own limit, and what base64 adds: more is nobody's, and is held before it is looked at.
+  gateway_options.max_request_bytes = 512 * 1024;
   if (const std::optional<ServerIdentity> tls = (*door)->TlsOf(config.http)) {
     gateway_options.tls_chain_pem = tls->chain_pem;
     gateway_options.tls_key_pem = tls->key_pem;

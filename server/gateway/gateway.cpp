@@ -171,8 +171,13 @@ class Gateway::Impl {
     if (error) return;  // gone already
     socket.set_option(tcp::no_delay(true), error);
     NoticeDeadPeer(socket.native_handle());
+    // An IPv4 caller of a socket for both is himself, not the network ::ffff:0:0.
+    net::ip::address address = peer.address();
+    if (address.is_v6() && address.to_v6().is_v4_mapped()) {
+      address = net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
+    }
     const auto connection =
-        HttpConnection::Start(std::move(socket), peer.address().to_string(), context_,
+        HttpConnection::Start(std::move(socket), address.to_string(), context_,
                               [this](HttpConnection* gone) { connections_.erase(gone); });
     connections_[connection.get()] = connection;
   }

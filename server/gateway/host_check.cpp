@@ -12,13 +12,21 @@
 namespace saccade {
 namespace {
 
-// "name:port" without its port; "[::1]:port" without brackets.
+// "", or ":" and digits.
+bool IsPort(absl::string_view rest) {
+  return rest.empty() ||
+         (rest.front() == ':' && std::all_of(rest.begin() + 1, rest.end(), absl::ascii_isdigit));
+}
+
+// "name:port" without its port; "[::1]:port" without brackets. Empty: it is neither.
 absl::string_view NameOf(absl::string_view host) {
   if (!host.empty() && host.front() == '[') {
     const std::size_t end = host.find(']');
-    return end == absl::string_view::npos ? absl::string_view() : host.substr(1, end - 1);
+    if (end == absl::string_view::npos || !IsPort(host.substr(end + 1))) return {};
+    return host.substr(1, end - 1);
   }
-  return host.substr(0, host.find(':'));
+  const std::size_t end = std::min(host.find(':'), host.size());
+  return IsPort(host.substr(end)) ? host.substr(0, end) : absl::string_view();
 }
 
 bool IsIpLiteral(const std::string& name) {

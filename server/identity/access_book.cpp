@@ -242,6 +242,8 @@ class AccessBook::Impl {
     if (invite == invites_.end()) return Unknown();
     const InviteFacts& facts = invite->second.facts;
     if (absl::Status ended = Ended(facts); !ended.ok()) return ended;
+    // Ended is ended, also where the clock was set back since.
+    if (told_.contains(token.id)) return Refused("this invite has expired");
     return Access{token.id, facts.role, facts.expires_unix_s};
   }
 

@@ -1,6 +1,8 @@
 #include "server/identity/access_rows.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <utility>
@@ -13,7 +15,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kVersion = 1;
-constexpr int kKeptAudit = 100'000;  // rows
+constexpr int kKeptAudit = 100'000;        // rows
+constexpr std::size_t kPruneAfter = 1000;  // entries written
 constexpr const char* kTables = R"(
 CREATE TABLE invites(
   id TEXT PRIMARY KEY, secret_sha256 TEXT NOT NULL, role TEXT NOT NULL, label TEXT NOT NULL,
@@ -59,11 +62,25 @@ InviteRow ReadInvite(const SqliteStatement& row) {
   return invite;
 }
 
+absl::Status CheckOurs(const fs::path& path) {
+  struct stat facts {};
+  if (::stat(path.c_str(), &facts) != 0) return absl::OkStatus();  // it is made, as ours
+  if (facts.st_uid == ::geteuid() && (facts.st_mode & 022) == 0) return absl::OkStatus();
+  return absl::PermissionDeniedError(
+      absl::StrCat(path.string(),
+                   ": other accounts of this machine can change it, and with it who is let in; "
+                   "take it over (chown, chmod go-w), or choose another --data-dir"));
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<AccessRows>> AccessRows::Open(const fs::path& directory) {
   if (absl::Status ready = PrepareDirectory(directory); !ready.ok()) return ready;
   const fs::path file = directory / "access.sqlite";
+  // Who may write there makes invites of his own.
+  for (const fs::path& path : {directory, file}) {
+    if (absl::Status ours = CheckOurs(path); !ours.ok()) return ours;
+  }
   std::error_code ignored;
   if (!fs::exists(file, ignored)) {
     if (absl::Status made = CreatePrivate(file); !made.ok()) return made;
@@ -79,9 +96,7 @@ absl::Status AccessRows::Load(std::int64_t forget_before_unix_s, std::vector<Inv
   const std::string forget =
       absl::StrCat("DELETE FROM invites WHERE expires_unix_s < ", forget_before_unix_s);
   if (absl::Status done = database_->Execute(forget.c_str()); !done.ok()) return done;
-  const std::string prune = absl::StrCat(
-      "DELETE FROM audit WHERE number <= (SELECT max(number) FROM audit) - ", kKeptAudit);
-  if (absl::Status done = database_->Execute(prune.c_str()); !done.ok()) return done;
+  if (absl::Status done = PruneAudit(); !done.ok()) return done;
   absl::StatusOr<SqliteStatement> all = database_->Prepare("SELECT * FROM invites");
   if (!all.ok()) return all.status();
   for (;;) {
@@ -164,13 +179,23 @@ absl::Status AccessRows::Put(const InviteRow& invite, const PassRow& pass) {
 }
 
 absl::Status AccessRows::Put(const std::vector<AuditFacts>& entries) {
+  since_pruned_ += entries.size();
+  const bool prune = since_pruned_ >= kPruneAfter;
+  if (prune) since_pruned_ = 0;
   return InTransaction([&] {
     absl::Status status;
     for (auto entry = entries.begin(); status.ok() && entry != entries.end(); ++entry) {
       status = Write(*entry);
     }
-    return status;
+    return status.ok() && prune ? PruneAudit() : status;
   });
+}
+
+absl::Status AccessRows::PruneAudit() {
+  return database_->Execute(
+      absl::StrCat("DELETE FROM audit WHERE number <= (SELECT max(number) FROM audit) - ",
+                   kKeptAudit)
+          .c_str());
 }
 
 absl::StatusOr<std::vector<AuditFacts>> AccessRows::ReadAudit(int most) {

@@ -44,10 +44,12 @@ class AccessRows {
   absl::Status Write(const InviteRow& invite);
   absl::Status Write(const PassRow& pass);
   absl::Status Write(const AuditFacts& entry);
+  absl::Status PruneAudit();
   template <typename WriteAll>
   absl::Status InTransaction(WriteAll write_all);
 
   std::unique_ptr<SqliteDatabase> database_;
+  std::size_t since_pruned_ = 0;  // entries of the audit
 };
 
 }  // namespace saccade

@@ -22,6 +22,8 @@ struct ServerNames {
 
   /// "localhost", this machine's name, and the addresses of every interface that is up.
   static ServerNames OfThisMachine();
+  /// One more: a host name or an IP literal (brackets allowed), unless it is there already.
+  void Add(std::string host);
 };
 
 /// An authority of one's own: ECDSA P-256, self-signed, ten years, for servers only.

@@ -85,6 +85,18 @@ absl::StatusOr<CertificateFacts> InspectCertificate(const std::string& pem) {
   return facts;
 }
 
+void ServerNames::Add(std::string host) {
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
+  }
+  if (host.empty()) return;
+  std::array<unsigned char, 16> bytes{};
+  const bool literal = inet_pton(AF_INET, host.c_str(), bytes.data()) == 1 ||
+                       inet_pton(AF_INET6, host.c_str(), bytes.data()) == 1;
+  std::vector<std::string>& known = literal ? addresses : dns;
+  if (std::find(known.begin(), known.end(), host) == known.end()) known.push_back(std::move(host));
+}
+
 ServerNames ServerNames::OfThisMachine() {
   ServerNames names{{"localhost"}, {"127.0.0.1", "::1"}};
   std::array<char, 256> own{};

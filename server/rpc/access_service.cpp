@@ -100,7 +100,7 @@ grpc::ServerUnaryReactor* AccessService::GetAccess(Context* context,
 grpc::ServerUnaryReactor* AccessService::Redeem(Context* context, const v1::RedeemRequest* request,
                                                 v1::RedeemResponse* response) {
   UnaryCall call(*context, "AccessService/Redeem", UnaryCall::Log::kAll);
-  if (const auto entered = call.Enter(gate_, Toll::kJoin); !entered.ok()) {
+  if (const auto entered = call.Enter(gate_, Toll::kRedeem); !entered.ok()) {
     return call.Finish(entered.status());
   }
   book_.Redeem(request->invite(), call.Answer<Issued>([response](const Issued& issued) {

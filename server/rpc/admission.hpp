@@ -11,8 +11,8 @@
 namespace saccade {
 
 /// Kinds of calls, by what they cost.
-enum class Toll { kJoin, kSubscribe, kEdit, kReset, kStill, kGaze, kRead };
-inline constexpr int kTolls = 7;
+enum class Toll { kJoin, kSubscribe, kEdit, kReset, kStill, kGaze, kRead, kRedeem };
+inline constexpr int kTolls = 8;
 
 /// How often each kind may be called by one session, by one address, and by all together.
 ///
@@ -32,6 +32,7 @@ struct RpcLimits {
   Kind still{{}, {}, {10, 30}, {20, 40}};            // 10 to 20 ms of a core each
   Kind gaze{{10, 20}, {60, 120}, {400, 800}, {}};    // heartbeats: 7 to 20 a second
   Kind read{{}, {}, {100, 500}, {}};                 // up to a megabyte each
+  Kind redeem{{}, {}, {1, 20}, {}};  // of invites, by strangers: nobody else's joins pay for them
 
   const Kind& of(Toll toll) const;
   /// Every rate and burst times `factor`; 0: no limits, for laboratories.

@@ -47,9 +47,11 @@ UnaryCall::Reactor* UnaryCall::Finish(const absl::Status& status) const {
   return reactor_;
 }
 
-// Of a flood nothing, as it changed nothing.
+// Of a flood nothing, as it changed nothing; and of strangers who were refused nothing, who would
+// fill the disk with it (the log has them).
 void UnaryCall::Keep(const absl::Status& status) const {
   if (book_ == nullptr || RetryInfoOf(status)) return;
+  if (!status.ok() && access_id_.empty()) return;
   const std::string outcome = status.ok() ? "ok" : status.ToString().substr(0, kMaxOutcomeBytes);
   book_->Record({0, participant_id_, display_name_, access_id_, "", method_, outcome});
 }

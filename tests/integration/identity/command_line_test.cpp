@@ -179,6 +179,84 @@ TEST(Loopback, NeedsNeitherCertificatesNorInvites) {
   EXPECT_THAT(server.process().err(), ::testing::Not(HasSubstr("INSECURE")));
 }
 
+/// On loopback and the simulator; `toml`: its file.
+std::unique_ptr<Server> Serve(const TemporaryFolder& folder, std::vector<std::string> options,
+                              const std::string& toml) {
+  std::ofstream(folder / "server.toml") << toml;
+  options.insert(options.end(), {"--source", "sim:desk?width=320&height=240", "--config",
+                                 folder / "server.toml", "--data-dir", folder / "data"});
+  return std::make_unique<Server>(options);
+}
+
+// A given certificate is not called 127.0.0.1, and its authority may be known to nobody.
+TEST(GivenCertificate, TheOwnerStillInvites) {
+  TemporaryFolder folder;
+  const auto authority = MakeAuthority("Somebody's");
+  ASSERT_TRUE(authority.ok());
+  const auto pair = MakeServerCertificate(*authority, {{"saccade.example"}, {}});
+  ASSERT_TRUE(pair.ok());
+  std::ofstream(folder / "chain.pem") << pair->certificate_pem;
+  std::ofstream(folder / "key.pem") << pair->key_pem;
+  const auto server =
+      Serve(folder, {"--tls-certificate", folder / "chain.pem", "--tls-key", folder / "key.pem"},
+            "[auth]\nrequired = true\n");
+  const RunResult invite = RunProgram(
+      {SACCADE_PROGRAM, "invite", "--role", "viewer", "--data-dir", folder / "data"}, seconds(20),
+      {"XDG_STATE_HOME=" + folder / "state", "XDG_DATA_HOME=" + folder / "home"});
+  EXPECT_EQ(invite.exit_code, 0) << invite.err;
+  EXPECT_THAT(invite.out, HasSubstr("#invite="));
+}
+
+// A proxy brings others to loopback.
+TEST(PublicUrl, AsksForInvitesOnLoopbackToo) {
+  TemporaryFolder folder;
+  const auto server = Serve(folder, {"--public-url", "https://saccade.example"}, "");
+  const RunResult status =
+      RunProgram({SACCADE_PROGRAM, "--server", server->grpc(), "status"}, seconds(20),
+                 {"XDG_STATE_HOME=" + folder / "state", "XDG_DATA_HOME=" + folder / "home"});
+  EXPECT_EQ(status.exit_code, 1);
+  EXPECT_THAT(status.err, HasSubstr("invite"));
+}
+
+TEST(DataFolder, ThatOthersCanChangeLetsNobodyIn) {
+  TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "data");
+  ASSERT_EQ(chmod((folder / "data").c_str(), 0777), 0);
+  std::ofstream(folder / "server.toml") << "[auth]\nrequired = true\n";
+  const RunResult run =
+      RunProgram({SACCADE_SERVER_PROGRAM, "--source", "sim:desk?width=320&height=240", "--grpc",
+                  "127.0.0.1:0", "--http", "127.0.0.1:0", "--run-for", "1", "--config",
+                  folder / "server.toml", "--data-dir", folder / "data"},
+                 seconds(30));
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_THAT(run.err, HasSubstr("other accounts of this machine can change it"));
+}
+
+// Who compares one fingerprint trusts one certificate.
+TEST(Trust, ASecondCertificateBehindTheRootIsRefused) {
+  TemporaryFolder folder;
+  const auto good = MakeAuthority("Ours"), evil = MakeAuthority("Theirs");
+  ASSERT_TRUE(good.ok() && evil.ok());
+  std::filesystem::create_directories(folder / "data/tls");
+  std::ofstream(folder / "data/tls/authority.pem") << good->certificate_pem;
+  const std::vector<std::string> trust = {SACCADE_PROGRAM, "trust", "--data-dir", folder / "data"};
+  EXPECT_EQ(RunProgram(trust, seconds(20)).out, good->certificate_pem);
+  std::ofstream(folder / "data/tls/authority.pem", std::ios::app) << evil->certificate_pem;
+  const RunResult both = RunProgram(trust, seconds(20));
+  EXPECT_EQ(both.exit_code, 1);
+  EXPECT_EQ(both.out, "");
+  EXPECT_THAT(both.err, HasSubstr("more than one certificate"));
+}
+
+TEST_F(GuardedCommandLine, StrangersFillNoAudit) {
+  for (int k = 0; k < 5; ++k) {
+    EXPECT_NE(server_->Call("saccade.v1.SessionService/Join", "", "").code, 0);
+  }
+  const RunResult audit = Owner({"audit", "--json"});
+  ASSERT_EQ(audit.exit_code, 0) << audit.err;
+  EXPECT_THAT(audit.out, ::testing::Not(HasSubstr("UNAUTHENTICATED")));
+}
+
 // Somebody else with an account on this machine: the folder is closed, and the port wants a token.
 TEST_F(GuardedCommandLine, ASecondUserOfTheMachineGetsNothing) {
   if (geteuid() != 0) GTEST_SKIP() << "needs root to become somebody else";

@@ -12,7 +12,8 @@ TEST(HostCheck, ForeignNamesAreRefused) {
     EXPECT_TRUE(check.HostAllowed(host)) << host;
   }
   for (const char* host : {"", "evil.example", "localhost.evil.example", "127.0.0.1.evil.example",
-                           ":8080", "[::1", "evil.example:127.0.0.1"}) {
+                           ":8080", "[::1", "evil.example:127.0.0.1", "localhost:@evil.example",
+                           "localhost:80x", "[::1]evil.example"}) {
     EXPECT_FALSE(check.HostAllowed(host)) << host;
   }
 }
