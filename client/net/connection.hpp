@@ -29,11 +29,11 @@ struct ConnectionOptions {
   std::string session_id;
   /// TLS, with `root_pem` for whom to trust; empty: the system's store. False: plain.
   bool tls = false;
-  std::string root_pem;
+  std::string root_pem{};
   /// The name that the certificate must have; empty: `server`'s host.
-  std::string tls_name;
+  std::string tls_name{};
   /// What the server lets in by (AccessClient::Redeem); secret. Empty: none.
-  std::string token;
+  std::string token{};
 
   absl::Status Validate() const;
 };
