@@ -103,10 +103,10 @@ TEST_F(BadDataSet, WithoutAFreeDescriptorTheRecordingStandsStill) {
 
 TEST_F(BadDataSet, PicturesThatCannotBeVideoAreRefused) {
   fs::create_directories(folder_ / "wide/rgb");
-  cv::imwrite(folder_ / "wide/rgb/0.png", cv::Mat(64, 4400, CV_8UC1, cv::Scalar(9)));
+  cv::imwrite(folder_ / "wide/rgb/0.png", cv::Mat(640, 4400, CV_8UC1, cv::Scalar(9)));
   WriteText(folder_ / "wide/rgb.txt", "0 rgb/0.png\n");
   WriteText(folder_ / "wide/camera.yaml",
-            "model: pinhole\nwidth: 4400\nheight: 64\nfx: 1000\nfy: 1000\ncx: 2200\ncy: 32\n");
+            "model: pinhole\nwidth: 4400\nheight: 640\nfx: 3000\nfy: 3000\ncx: 2200\ncy: 320\n");
   ExpectRefusedStart("pictures wider than the video coder takes",
                      {"--source", "dataset:" + (folder_ / "wide"), "--data-dir", folder_ / "data"},
                      1, "no video");
