@@ -237,7 +237,14 @@ absl::Status RunAccess(const Options& options) {
   to.server = owner->server;
   to.tls = owner->tls;
   to.root_pem = owner->root_pem;
+  to.tls_name = owner->name;
   to.token = owner->token;
+  if (!options.trust.empty()) {
+    absl::StatusOr<std::string> root =
+        ReadRegularFile(options.trust, kMaxPemBytes, "a certificate");
+    if (!root.ok()) return root.status();
+    to.root_pem = *std::move(root);
+  }
   net::AccessClient client(to);
   switch (options.command) {
     case Command::kInvite:

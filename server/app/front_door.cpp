@@ -137,10 +137,10 @@ absl::Status FrontDoor::Announce(int grpc_port, int http_port) {
         "network sees and changes everything");
   }
   if (!config_.auth_required) return absl::OkStatus();
-  // A given certificate has no name like 127.0.0.1, and perhaps an authority that is not public:
-  // who can read this file trusts it as it is.
+  // A given certificate has no name like 127.0.0.1; whom it is by is the system's store to say, or
+  // --trust.
   const bool given = identity_ && !config_.tls_certificate.empty();
-  const std::string root = !identity_ ? "" : given ? identity_->chain_pem : identity_->root_pem;
+  const std::string root = !identity_ ? "" : given ? "" : identity_->root_pem;
   const nlohmann::json owner = {{"grpc", LocalAddress(config_.grpc, grpc_port)},
                                 {"tls", config_.WantsTls(config_.grpc)},
                                 {"root", root},

@@ -188,7 +188,7 @@ std::unique_ptr<Server> Serve(const TemporaryFolder& folder, std::vector<std::st
   return std::make_unique<Server>(options);
 }
 
-// A given certificate is not called 127.0.0.1, and its authority may be known to nobody.
+// A given certificate is not called 127.0.0.1. Its authority is known to nobody here: --trust.
 TEST(GivenCertificate, TheOwnerStillInvites) {
   TemporaryFolder folder;
   const auto authority = MakeAuthority("Somebody's");
@@ -197,12 +197,14 @@ TEST(GivenCertificate, TheOwnerStillInvites) {
   ASSERT_TRUE(pair.ok());
   std::ofstream(folder / "chain.pem") << pair->certificate_pem;
   std::ofstream(folder / "key.pem") << pair->key_pem;
+  std::ofstream(folder / "root.pem") << authority->certificate_pem;
   const auto server =
       Serve(folder, {"--tls-certificate", folder / "chain.pem", "--tls-key", folder / "key.pem"},
             "[auth]\nrequired = true\n");
   const RunResult invite = RunProgram(
-      {SACCADE_PROGRAM, "invite", "--role", "viewer", "--data-dir", folder / "data"}, seconds(20),
-      {"XDG_STATE_HOME=" + folder / "state", "XDG_DATA_HOME=" + folder / "home"});
+      {SACCADE_PROGRAM, "invite", "--role", "viewer", "--trust", folder / "root.pem", "--data-dir",
+       folder / "data"},
+      seconds(20), {"XDG_STATE_HOME=" + folder / "state", "XDG_DATA_HOME=" + folder / "home"});
   EXPECT_EQ(invite.exit_code, 0) << invite.err;
   EXPECT_THAT(invite.out, HasSubstr("#invite="));
 }
