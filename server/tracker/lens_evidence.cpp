@@ -14,6 +14,19 @@ namespace {
 constexpr double kDepthKnown = 0.3;  // sigma / inverse range, to begin with
 constexpr int kFewestSeen = 12;      // in one view
 
+/// How far a camera has turned since a view, and gone against the distance to what that saw [rad].
+double StepFrom(const LensView& last, const Rigid3& world_from_camera,
+                const std::map<FeatureId, Eigen::Vector3d>& points_in_world) {
+  double distance_m = 0.0;
+  for (const LensView::Seen& seen : last.seen) {
+    distance_m += (points_in_world.at(seen.id) - last.world_from_camera.translation).norm();
+  }
+  distance_m /= static_cast<double>(last.seen.size());
+  const double gone = (last.world_from_camera.translation - world_from_camera.translation).norm();
+  return last.world_from_camera.rotation.angularDistance(world_from_camera.rotation) +
+         gone / distance_m;
+}
+
 }  // namespace
 
 void LensEvidence::Add(const CameraModel& camera, const FilterState& filter,
@@ -22,27 +35,23 @@ void LensEvidence::Add(const CameraModel& camera, const FilterState& filter,
     if (running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     Judge(running_.get());
   }
+  if (matches.accepted < kFewestSeen) return;
   LensView view;
   view.world_from_camera = filter.camera().world_from_camera;
-  if (matches.accepted < kFewestSeen) return;
+  // Asked first: most frames are no view, and what follows asks for the covariance of every match.
+  if (!views_.empty() &&
+      StepFrom(views_.back(), view.world_from_camera, points_in_world_) < options_.least_step_rad) {
+    return;
+  }
   std::map<FeatureId, Eigen::Vector3d> points;
-  double distance_m = 0.0;
   for (const LandmarkMatch& match : matches.in_view) {
     if (!match.accepted() || !filter.Has(match.id)) continue;
     const FeatureMarginal at = filter.Marginal(match.id);
     if (!(at.inverse_range_sigma < kDepthKnown * at.inverse_range)) continue;
     view.seen.push_back({match.id, match.pixel - match.row_shift});
     points[match.id] = at.point_in_world;
-    distance_m += (at.point_in_world - view.world_from_camera.translation).norm();
   }
   if (std::ssize(view.seen) < kFewestSeen) return;
-  distance_m /= static_cast<double>(view.seen.size());
-  if (!views_.empty()) {
-    const Rigid3& last = views_.back().world_from_camera;
-    const double turned = last.rotation.angularDistance(view.world_from_camera.rotation);
-    const double gone = (last.translation - view.world_from_camera.translation).norm();
-    if (turned + gone / distance_m < options_.least_step_rad) return;
-  }
   for (const auto& [id, point] : points) points_in_world_[id] = point;
   views_.push_back(std::move(view));
   if (std::ssize(views_) < options_.views) return;
