@@ -13,11 +13,13 @@ import { GazePanel } from './gaze_panel';
 import { HandoverNotice } from './handover_notice';
 import { Header } from './header';
 import { Help } from './help';
+import { InsetCorner } from './inset';
 import { handleKeys } from './keys';
 import { MapPane } from './map_pane';
 import { Notes } from './notes';
 import type { Player } from './player';
 import { handleMapPointer, handleVideoPointer } from './pointer';
+import { Sheets } from './sheets';
 import { Strip } from './strip';
 import { ToolsColumn } from './tools_column';
 import { VideoPane } from './video_pane';
@@ -34,6 +36,8 @@ export class App {
   private readonly help = new Help();
   private readonly header = new Header(this.help.button, (name) => this.session.rename(name));
   private readonly strip = new Strip();
+  private readonly sheets = new Sheets(this.state);
+  private readonly inset = new InsetCorner();
   private readonly map: MapPane;
   private readonly video: VideoPane;
   private readonly tools: ToolsColumn;
@@ -71,6 +75,7 @@ export class App {
       this.stage,
       h('div', { class: 'side' }, this.annotations.element, this.gaze.element),
       this.strip.element,
+      this.sheets.element,
       this.help.dialog,
     );
     notes.listen();
@@ -97,6 +102,7 @@ export class App {
     this.screen.add(nowMs);
     const { state, session, player } = this;
     this.stage.dataset['main'] = state.main;
+    this.element.dataset['sheet'] = state.sheet ?? '';
     if (player.draw()) {
       this.measure();
       this.element.dataset['firstPictureMs'] ??= performance.now().toFixed(0);
@@ -104,6 +110,7 @@ export class App {
     }
     this.video.draw();
     this.map.draw(nowMs, this.screen.rate(nowMs));
+    this.placeInset(nowMs);
     state.expire(nowMs);
     this.notice.update(nowMs);
     this.pilot.check();
@@ -122,9 +129,19 @@ export class App {
       freeze: this.video.frozen,
     });
     this.annotations.update();
+    this.sheets.update(session.annotations.list().length);
     this.gaze.update();
     setClass(this.element, 'no-head', !hasHead(session.gaze));
     if (hasHead(session.gaze)) this.pilot.warm();
+  }
+
+  /** The video keeps off the wearer's camera in the map. */
+  private placeInset(nowMs: number): void {
+    const { clientWidth: width, clientHeight: height } = this.video.element;
+    const { element } = this.map;
+    const pane = { width: element.clientWidth, height: element.clientHeight };
+    const camera = this.state.main === 'map' ? this.map.cameraAt() : undefined;
+    this.stage.dataset['corner'] = this.inset.update(nowMs, camera, pane, { width, height });
   }
 
   private measure(): void {

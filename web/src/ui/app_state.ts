@@ -7,6 +7,9 @@ export type Place = ToolName | CommandName | PaneName | 'head' | `annotation ${s
 
 export type PaneName = 'map' | 'video';
 
+/** Panels that small windows show one at a time. */
+export type SheetName = 'marks' | 'gaze';
+
 export interface Hover {
   readonly pane: PaneName;
   readonly pixel: Pixel;
@@ -20,6 +23,7 @@ export class AppState {
   pointedId: string | undefined; // the one whose row is pointed at
   hover: Hover | undefined;
   main: PaneName = 'map';
+  sheet: SheetName | undefined;
   confirmingReset = false;
   /** Of new marks, 0xRRGGBBAA. */
   colorRgba = 0xffffffff;

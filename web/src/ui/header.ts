@@ -21,7 +21,7 @@ export class Header {
     this.status,
     this.advice,
   );
-  private readonly rate = h('span', { class: 'number', title: 'pictures shown a second' });
+  private readonly rate = h('span', { class: 'number rate', title: 'pictures shown a second' });
   private readonly latency = h('span', {
     class: 'number',
     title: 'from the middle of the exposure to this screen, median of the last 90 pictures',

@@ -39,6 +39,15 @@ export class MapPane extends Pane {
     return this.map?.view();
   }
 
+  /** Where the wearer's camera appears, in CSS pixels of this pane. */
+  cameraAt(): Pixel | undefined {
+    const view = this.view();
+    const pose = this.player.shown?.facts.pose;
+    return view && isPlaced(pose)
+      ? projectPoint(view, pose.worldFromCamera.translation)
+      : undefined;
+  }
+
   pixelAt(clientX: number, clientY: number): Pixel {
     const box = this.element.getBoundingClientRect();
     return { u: clientX - box.left - 0.5, v: clientY - box.top - 0.5 };

@@ -1,5 +1,6 @@
 import { type CommandName, COMMANDS, type Control, type ToolName, TOOLS } from '../tools/tools';
 import type { AppState } from './app_state';
+import { beside } from './beside';
 import { h, icon, setClass, setText } from './dom';
 import { ICONS } from './icons';
 
@@ -42,6 +43,9 @@ export class ToolsColumn {
       h('b', {}, control.label),
       control.hint,
     );
+    for (const event of ['pointerenter', 'focus'] as const) {
+      button.addEventListener(event, () => beside(tip, button));
+    }
     const reason = h('span', { class: 'reason', role: 'alert' });
     this.reasons.set(control.name, reason);
     this.element.append(h('div', { class: 'tool' }, button, tip, reason));
@@ -75,9 +79,18 @@ export class ToolsColumn {
       setClass(button, 'on', isOn);
       button.setAttribute('aria-pressed', String(isOn));
     }
-    for (const [name, element] of this.reasons) setText(element, state.refusal(name) ?? '');
+    for (const [name, element] of this.reasons) {
+      setText(element, state.refusal(name) ?? '');
+      this.putBeside(element, name);
+    }
     const opening = state.confirmingReset && this.confirm.classList.contains('hidden');
     setClass(this.confirm, 'hidden', !state.confirmingReset);
+    if (state.confirmingReset) this.putBeside(this.confirm, 'reset');
     if (opening) this.confirm.querySelector<HTMLButtonElement>('button:last-child')?.focus();
+  }
+
+  private putBeside(words: HTMLElement, name: string): void {
+    const button = this.buttons.get(name);
+    if (button && words.textContent !== '') beside(words, button);
   }
 }

@@ -101,6 +101,13 @@ function trackingWords(pose: Pose | undefined): StatusWords {
   }
 }
 
+/** For the picture of a camera that does not know where it is: what that means for it. */
+export function lostWords(pose: Pose | undefined): string {
+  if (pose?.status !== 'lost' && pose?.status !== 'relocalising') return '';
+  const { text, advice } = trackingWords(pose);
+  return `${text === 'lost' ? 'Lost' : 'Searching its place'}: ${advice}. Marks come back with it`;
+}
+
 /** "1 frame", "2 frames". */
 export const counted = (count: number, thing: string): string =>
   `${count} ${thing}${count === 1 ? '' : 's'}`;
