@@ -13,6 +13,9 @@ export type CommandName =
 /** What the head does at once, or who steers it. */
 export type HeadCommandName = 'stop' | 'home' | 'level' | 'explore' | 'fast' | 'lease';
 
+/** What happens to the marks as a whole, above their list. */
+export type MarkCommandName = 'mine' | 'hide' | 'snapshot';
+
 export interface Control<Name extends string> {
   readonly name: Name;
   readonly label: string;
@@ -106,6 +109,19 @@ export const HEAD_COMMANDS: readonly Control<HeadCommandName>[] = [
   },
 ];
 
+/** Above the list of marks. */
+export const MARK_COMMANDS: readonly Control<MarkCommandName>[] = [
+  { name: 'mine', label: 'Only mine', key: 'o', shown: 'O', hint: 'list and draw only your marks' },
+  { name: 'hide', label: 'Hide marks', key: 'm', shown: 'M', hint: 'draw no marks; again: all' },
+  {
+    name: 'snapshot',
+    label: 'Snapshot',
+    key: 'k',
+    shown: 'K',
+    hint: 'keep the picture with its marks as a PNG',
+  },
+];
+
 export const shapeOf = (tool: ToolName): Shape | undefined =>
   tool === 'select' || tool === 'gaze' ? undefined : tool;
 
@@ -116,7 +132,7 @@ export function controlOf(event: {
   readonly altKey: boolean;
   readonly metaKey: boolean;
   readonly shiftKey: boolean;
-}): ToolName | CommandName | HeadCommandName | undefined {
+}): ToolName | CommandName | HeadCommandName | MarkCommandName | undefined {
   const key = event.key.toLowerCase();
   if (event.altKey) return undefined;
   if (event.ctrlKey || event.metaKey) {
@@ -124,5 +140,7 @@ export function controlOf(event: {
     return key === 'y' ? 'redo' : undefined;
   }
   if (key === 'backspace') return 'delete';
-  return [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS].find((control) => control.key === key)?.name;
+  return [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS, ...MARK_COMMANDS].find(
+    (control) => control.key === key,
+  )?.name;
 }

@@ -1,9 +1,12 @@
 import { colourOf } from '../scene/strokes';
 import type { Annotation } from '../session/types';
 import type { Session } from '../session/session';
+import { isFiltering } from '../tools/mark_filter';
+import type { MarkCommandName } from '../tools/tools';
 import type { AppState } from './app_state';
 import { h, icon, setClass, setText } from './dom';
 import { ICONS } from './icons';
+import { MarksBar } from './marks_bar';
 import { Palette } from './palette';
 import { anchorWords, dated, shapeWord } from './words';
 
@@ -17,7 +20,11 @@ export interface AnnotationActions {
   /** The colour of new marks, and of the selected one: 0xRRGGBBAA. */
   paint(colorRgba: number): void;
   startEditing(id: string): void;
+  runMarks(command: MarkCommandName): void;
 }
+
+const NONE =
+  'None yet. Choose a cube (C), note (N) or arrow (A), then click in the map or the video.';
 
 interface Row {
   readonly element: HTMLElement;
@@ -32,13 +39,10 @@ export class AnnotationsPanel {
   readonly element: HTMLElement;
   private readonly count = h('span', { class: 'number' });
   private readonly list = h('ul', {});
-  private readonly empty = h(
-    'p',
-    { class: 'empty' },
-    'None yet. Choose a cube (C), note (N) or arrow (A), then click in the map or the video.',
-  );
+  private readonly empty = h('p', { class: 'empty' });
   private readonly rows = new Map<string, Row>();
   private readonly palette: Palette;
+  readonly bar: MarksBar;
 
   constructor(
     private readonly session: Session,
@@ -47,11 +51,13 @@ export class AnnotationsPanel {
     editor: HTMLElement,
   ) {
     this.palette = new Palette((colour) => actions.paint(colour));
+    this.bar = new MarksBar(state, (command) => actions.runMarks(command));
     this.element = h(
       'aside',
       { 'aria-label': 'Annotations' },
       h('h2', {}, 'Annotations', this.count),
       this.palette.element,
+      this.bar.element,
       editor,
       this.empty,
       this.list,
@@ -59,8 +65,12 @@ export class AnnotationsPanel {
   }
 
   update(): void {
-    const annotations = this.session.annotations.list();
-    setText(this.count, String(annotations.length));
+    const all = this.session.annotations.list();
+    const annotations = all.filter((annotation) => this.state.lists(annotation));
+    const some = isFiltering(this.state.filter) ? `${annotations.length} of ` : '';
+    setText(this.count, `${some}${all.length}`);
+    this.bar.update();
+    setText(this.empty, all.length === 0 ? NONE : 'None of the marks is like that.');
     this.palette.update(this.state.colorRgba);
     setClass(this.empty, 'hidden', annotations.length > 0);
     const present = new Set(annotations.map(({ id }) => id));

@@ -81,7 +81,11 @@ export class App {
     notes.listen();
     handleMapPointer(this.map, controller.mapGestures());
     handleVideoPointer(this.video.element, controller.videoGestures());
-    handleKeys(controller, gaze, this.map, this.video, this.help);
+    handleKeys(controller, gaze, this.map, this.video, this.help, () => {
+      state.sheet = 'marks';
+      this.element.dataset['sheet'] = 'marks'; // the field must be there to be given the keyboard
+      this.annotations.bar.focus();
+    });
   }
 
   start(): void {
@@ -112,6 +116,8 @@ export class App {
     this.map.draw(nowMs, this.screen.rate(nowMs));
     this.placeInset(nowMs);
     state.expire(nowMs);
+    const me = session.participants.find((each) => each.participantId === session.participantId);
+    state.myName = me?.name ?? session.displayName;
     this.notice.update(nowMs);
     this.pilot.check();
     const version = [

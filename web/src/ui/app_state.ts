@@ -1,9 +1,17 @@
 import type { Pixel, Vec3 } from '../geometry/vec3';
+import type { Annotation } from '../session/types';
 import type { Landing } from '../tools/landing';
-import type { CommandName, ToolName } from '../tools/tools';
+import { type MarkFilter, NO_FILTER, passes } from '../tools/mark_filter';
+import type { CommandName, MarkCommandName, ToolName } from '../tools/tools';
 
 /** Where a refusal is shown: beside what could not be done. */
-export type Place = ToolName | CommandName | PaneName | 'head' | `annotation ${string}`;
+export type Place =
+  | ToolName
+  | CommandName
+  | MarkCommandName
+  | PaneName
+  | 'head'
+  | `annotation ${string}`;
 
 export type PaneName = 'map' | 'video';
 
@@ -25,6 +33,11 @@ export class AppState {
   main: PaneName = 'map';
   sheet: SheetName | undefined;
   confirmingReset = false;
+  /** Which marks are listed and drawn. */
+  filter: MarkFilter = NO_FILTER;
+  hideMarks = false;
+  /** As others see this person. */
+  myName = '';
   /** Of new marks, 0xRRGGBBAA. */
   colorRgba = 0xffffffff;
   /** The head turns as fast as it can. */
@@ -35,6 +48,17 @@ export class AppState {
   private readonly refusals = new Map<string, { text: string; untilMs: number }>();
   /** Rises with every change that panels show. */
   version = 0;
+
+  /** True if the list has it. */
+  lists(annotation: Annotation): boolean {
+    return passes(annotation, this.filter, this.myName);
+  }
+
+  /** True if it is drawn: a selected one always is. */
+  draws(annotation: Annotation): boolean {
+    if (annotation.id === this.selectedId) return true;
+    return !this.hideMarks && this.lists(annotation);
+  }
 
   changed(): void {
     ++this.version;

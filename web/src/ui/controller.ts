@@ -5,7 +5,7 @@ import type { Session } from '../session/session';
 import { type Annotation, isPlaced } from '../session/types';
 import { type Landing, landingInMap, landingInVideo, rayThrough } from '../tools/landing';
 import { pickNearest } from '../tools/pick';
-import { type CommandName, shapeOf, type ToolName } from '../tools/tools';
+import { type CommandName, type MarkCommandName, shapeOf, type ToolName } from '../tools/tools';
 import type { AnnotationActions } from './annotations_panel';
 import type { AppState, PaneName, Place } from './app_state';
 import type { GazeController } from './gaze_controller';
@@ -70,6 +70,18 @@ export class Controller implements ToolActions, AnnotationActions {
       case 'reset':
         state.confirmingReset = !state.confirmingReset;
         break;
+    }
+    state.changed();
+  }
+
+  runMarks(command: MarkCommandName): void {
+    const { state } = this;
+    if (command === 'mine') state.filter = { ...state.filter, mine: !state.filter.mine };
+    else if (command === 'hide') state.hideMarks = !state.hideMarks;
+    else {
+      this.video
+        .snapshot(state.myName)
+        .catch((error: unknown) => state.refuse('snapshot', `No snapshot: ${String(error)}`));
     }
     state.changed();
   }
@@ -205,7 +217,7 @@ export class Controller implements ToolActions, AnnotationActions {
   }
 
   private pick(view: View, pixel: Pixel, radius: number): Annotation | undefined {
-    const annotations = this.session.annotations.list();
+    const annotations = this.session.annotations.list().filter((each) => this.state.draws(each));
     return pickNearest(view, pixel, annotations, ({ anchor }) => anchor.pointInWorld, radius);
   }
 

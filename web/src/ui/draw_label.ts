@@ -15,12 +15,27 @@ export interface LabelPlace {
   readonly pane: { readonly width: number; readonly height: number } | undefined;
 }
 
-/** A filled box with text, its lower left corner beside a point. */
+/** On the canvas [px]. */
+export interface Box {
+  readonly x: number;
+  readonly y: number;
+  readonly width: number;
+  readonly height: number;
+}
+
+const overlap = (a: Box, b: Box): boolean =>
+  a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
+
+/**
+ * A filled box with text, its lower left corner beside a point. Where it would lie over one of `taken`
+ * it is left out, and otherwise joins them: of a crowd of marks some can be read, and each when chosen.
+ */
 export function drawLabel(
   context: CanvasRenderingContext2D,
   { text, whole }: { readonly text: string; readonly whole: string },
   { x: atX, y: atY, ratio, pane }: LabelPlace,
   { colour, hollow }: { readonly colour: string; readonly hollow: boolean },
+  taken?: Box[],
 ): void {
   context.font = FONT.replace('13', String(13 * ratio));
   const widthOf = (line: string): number => context.measureText(line).width;
@@ -38,6 +53,9 @@ export function drawLabel(
     x = Math.max(0, Math.min(x, pane.width - width));
     y = Math.max(0, Math.min(y, pane.height - height));
   }
+  const box = { x, y, width, height };
+  if (taken?.some((other) => overlap(box, other))) return;
+  taken?.push(box);
   context.fillStyle = 'rgba(16, 17, 18, 0.86)';
   context.strokeStyle = colour;
   context.lineWidth = 1.5 * ratio;

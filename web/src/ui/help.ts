@@ -1,4 +1,4 @@
-import { COMMANDS, HEAD_COMMANDS, TOOLS } from '../tools/tools';
+import { COMMANDS, HEAD_COMMANDS, MARK_COMMANDS, TOOLS } from '../tools/tools';
 import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { FeatureState } from '../session/types';
 import { h } from './dom';
@@ -20,9 +20,18 @@ export class Help {
 
   constructor() {
     const keys = h('dl', {});
-    for (const { label, shown, hint } of [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS]) {
+    for (const { label, shown, hint } of [
+      ...TOOLS,
+      ...COMMANDS,
+      ...HEAD_COMMANDS,
+      ...MARK_COMMANDS,
+    ]) {
       keys.append(h('dt', {}, h('kbd', {}, shown), label), h('dd', {}, hint));
     }
+    keys.append(
+      h('dt', {}, h('kbd', {}, '/'), 'Find'),
+      h('dd', {}, 'find marks by text, shape, author'),
+    );
     const legend = h('ul', { class: 'legend' });
     const explain = (colour: string, sign: string, words: string): void => {
       const mark = h('span', { class: 'sign' }, sign);

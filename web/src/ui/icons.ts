@@ -1,7 +1,10 @@
-import type { CommandName, HeadCommandName, ToolName } from '../tools/tools';
+import type { CommandName, HeadCommandName, MarkCommandName, ToolName } from '../tools/tools';
 
 /** Line drawings on a 20 x 20 field. */
-export const ICONS: Record<ToolName | CommandName | HeadCommandName | 'help', string> = {
+export const ICONS: Record<
+  ToolName | CommandName | HeadCommandName | MarkCommandName | 'help',
+  string
+> = {
   select: 'M5 3l10 7-4.5.8 2.6 4.7-2 1.1-2.6-4.7L5 15z',
   cube: 'M10 2.5l6.5 3.7v7.6L10 17.5l-6.5-3.7V6.2zM3.5 6.2L10 10l6.5-3.8M10 10v7.5',
   note: 'M3.5 3.5h13v9h-7l-3.5 4v-4h-2.5zM6.5 6.5h7M6.5 9.5h4.5',
@@ -21,5 +24,8 @@ export const ICONS: Record<ToolName | CommandName | HeadCommandName | 'help', st
   follow: 'M10 6.5a3.5 3.5 0 100 7 3.5 3.5 0 000-7zM10 2v3M10 15v3M2 10h3M15 10h3',
   frame: 'M3 7V3h4M13 3h4v4M17 13v4h-4M7 17H3v-4M8 8h4v4H8z',
   reset: 'M15.5 6.5A6.5 6.5 0 1016.5 10M16 3v4h-4',
+  mine: 'M10 3.5a3 3 0 100 6 3 3 0 000-6zM4 17c0-3.5 2.5-5.5 6-5.5s6 2 6 5.5',
+  hide: 'M2 10s3-5 8-5 8 5 8 5-3 5-8 5-8-5-8-5zM4 16.5L16 3.5',
+  snapshot: 'M3 6.5h3.5L8 4.5h4l1.5 2H17v9H3zM10 8.2a2.8 2.8 0 100 5.6 2.8 2.8 0 000-5.6z',
   help: 'M7.5 7.5a2.5 2.5 0 115 0c0 1.8-2.5 2-2.5 4M10 14.5v.5',
 };

@@ -3,6 +3,8 @@ import {
   controlOf,
   HEAD_COMMANDS,
   type HeadCommandName,
+  MARK_COMMANDS,
+  type MarkCommandName,
   type ToolName,
   TOOLS,
 } from '../tools/tools';
@@ -15,10 +17,12 @@ import type { VideoPane } from './video_pane';
 
 const TURN_RAD = 0.12;
 
-type Name = ToolName | CommandName | HeadCommandName;
+type Name = ToolName | CommandName | HeadCommandName | MarkCommandName;
 const isTool = (name: Name): name is ToolName => TOOLS.some((tool) => tool.name === name);
 const isHeadCommand = (name: Name): name is HeadCommandName =>
   HEAD_COMMANDS.some((command) => command.name === name);
+const isMarkCommand = (name: Name): name is MarkCommandName =>
+  MARK_COMMANDS.some((command) => command.name === name);
 
 /** Everything the pointer does, by key. */
 export function handleKeys(
@@ -27,17 +31,23 @@ export function handleKeys(
   map: MapPane,
   video: VideoPane,
   help: Help,
+  find: () => void,
 ): void {
   document.addEventListener('keydown', (event) => {
     if (isTextField(event.target) || isComposing(event) || help.dialog.open) return;
     const name = controlOf(event);
     if (event.key === '?') help.toggle();
     if (event.key === 'Escape') controller.escape();
+    if (event.key === '/' && !event.ctrlKey && !event.metaKey && !event.altKey) {
+      event.preventDefault();
+      find();
+    }
     if (!name) return;
     event.preventDefault();
     if (event.repeat && isHeadCommand(name)) return;
     if (isTool(name)) controller.choose(name);
     else if (isHeadCommand(name)) gaze.run(name);
+    else if (isMarkCommand(name)) controller.runMarks(name);
     else controller.run(name);
   });
   map.element.addEventListener('keydown', (event) => {

@@ -3,7 +3,7 @@ import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { EdgeArrow } from '../scene/edge_arrows';
 import type { AxisStroke, Label, Marks } from '../scene/strokes';
 import type { FeatureState } from '../session/types';
-import { drawLabel, FONT } from './draw_label';
+import { type Box, drawLabel, FONT } from './draw_label';
 
 const LINE = '#ffffff';
 const ACCENT = '#c4b0ff';
@@ -21,7 +21,8 @@ export class Painter {
   private ratio = 1;
   private right = 0; // edge of what is drawn on [canvas px]
 
-  constructor() {
+  /** `ratio`: canvas pixels per CSS pixel; by default the screen's. */
+  constructor(private readonly fixedRatio?: number) {
     this.canvas.className = 'marks';
     const context = this.canvas.getContext('2d');
     if (!context) throw new Error('this browser has no 2D canvas');
@@ -33,7 +34,7 @@ export class Painter {
     pane: { width: number; height: number },
     rect: { left: number; top: number; scale: number },
   ): void {
-    this.ratio = Math.min(window.devicePixelRatio, 2);
+    this.ratio = this.fixedRatio ?? Math.min(window.devicePixelRatio, 2);
     const width = Math.round(pane.width * this.ratio);
     const height = Math.round(pane.height * this.ratio);
     if (this.canvas.width !== width) this.canvas.width = width;
@@ -98,18 +99,18 @@ export class Painter {
       this.context.setLineDash([]);
     }
     const topmost = labels.filter(({ annotationId }) => chosen(annotationId));
-    for (const label of labels.filter(({ annotationId }) => !chosen(annotationId))) {
-      this.label(label, label.colour, false);
-    }
+    const taken: Box[] = [];
+    const others = labels.filter(({ annotationId }) => !chosen(annotationId));
+    for (const label of others.reverse()) this.label(label, label.colour, false, taken); // newest first
     // The chosen one says all it has to say, where there is room for it.
     for (const label of topmost) this.label(label, ACCENT, true);
   }
 
-  private label(label: Label, colour: string, whole: boolean): void {
+  private label(label: Label, colour: string, whole: boolean, taken?: Box[]): void {
     const { at, hollow } = label;
     const pane = whole ? { width: this.right, height: this.canvas.height } : undefined;
     const place = { x: this.x(at), y: this.y(at), ratio: this.ratio, pane };
-    drawLabel(this.context, label, place, { colour, hollow });
+    drawLabel(this.context, label, place, { colour, hollow }, taken);
   }
 
   /** Towards marks outside the picture: filled, or an outline where not to be trusted. */

@@ -44,9 +44,14 @@ export abstract class Pane {
     return [this.state.selectedId, this.state.pointedId];
   }
 
+  protected marks(): Mark[] {
+    const { session, state } = this;
+    return allMarks(session.annotations, session.scale, (annotation) => state.draws(annotation));
+  }
+
   /** Axes and every mark in `view`; returns the marks. */
   protected drawMarks(view: View): readonly Mark[] {
-    const marks = allMarks(this.session.annotations, this.session.scale);
+    const marks = this.marks();
     this.painter.axes(axisStrokes(view));
     this.painter.marks(strokesOf(view, marks), this.accented);
     return marks;

@@ -10,6 +10,7 @@ import { Darkness } from './darkness';
 import { arrowLabel } from './gaze_words';
 import { Pane } from './pane';
 import type { Player } from './player';
+import { save, takeSnapshot } from './snapshot';
 import { Still } from './still';
 import { crowdedWords, lostWords } from './words';
 
@@ -53,6 +54,20 @@ export class VideoPane extends Pane {
     if (!facts) return undefined;
     const { pose, camera } = facts;
     return { facts, view: isPlaced(pose) ? makeView(camera, pose.worldFromCamera) : undefined };
+  }
+
+  /** Keeps the picture on the screen with its marks as a file. */
+  async snapshot(takenBy: string): Promise<void> {
+    const current = this.current();
+    if (!current) throw new Error('there is no picture yet');
+    const { session, state, player, still } = this;
+    const marks = this.sameMap ? this.marks() : [];
+    const annotations = session.annotations.list().filter((each) => state.draws(each));
+    const blob = await takeSnapshot(still?.canvas ?? player.canvas, current.view, marks, {
+      ...{ facts: current.facts, source: session.joined?.source ?? '', takenBy },
+      ...{ metric: session.scale.metric, annotations },
+    });
+    save(blob, `saccade-${current.facts.frameId}.png`);
   }
 
   /** Picture pixel under a pointer; undefined outside the picture. */

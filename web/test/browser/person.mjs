@@ -6,6 +6,7 @@ import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { AnnotationService } from '../../src/gen/saccade/v1/annotation_pb.js';
 import { GazeService } from '../../src/gen/saccade/v1/gaze_pb.js';
 import { Expert } from './expert.mjs';
+import { checkMarks } from './marks.mjs';
 import { startServer } from './server.mjs';
 
 const LATE_MS = 400; // a server across the ocean, or a busy one
@@ -38,6 +39,7 @@ export async function runPerson({ server: binary, chromium, seed, shots, folder 
     await refusal(context);
     await emptyCorner(context);
     await wholeText(context);
+    await checkMarks(context);
     await buttons(context);
     await reload(context);
     await manyTabs(context);
