@@ -12,6 +12,7 @@
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/text.hpp"
+#include "shared/version/version.hpp"
 
 namespace saccade::cli {
 namespace {
@@ -235,7 +236,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   Raw raw;
   options.connection.display_name = "saccade";
   CLI::App app("Talks to a Saccade server: what it sees, its map, its annotations.", "saccade");
-  app.set_version_flag("--version", std::string("saccade ") + SACCADE_VERSION);
+  app.set_version_flag("--version", std::string("saccade ") + Version());
   app.add_option("--server", options.connection.server, "HOST:PORT of the server's gRPC address")
       ->capture_default_str();
   app.add_option("--timeout", raw.timeout_s, "Seconds to wait for an answer")

@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "server/eval/commands.hpp"
+#include "shared/version/version.hpp"
 
 namespace saccade {
 namespace {
@@ -169,7 +170,7 @@ int Main(int argc, char** argv) {
   HearSignals();
   cv::setNumThreads(1);  // results must not depend on the machine's cores
   CLI::App app("Saccade's evaluation: runs on recordings, scores, simulation", "saccade-eval");
-  app.set_version_flag("--version", "saccade-eval " SACCADE_VERSION);
+  app.set_version_flag("--version", std::string("saccade-eval ") + Version());
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return absl::StrCat(failed->get_name(), ": ", error.what(), "; see --help\n");
