@@ -60,7 +60,8 @@ await_status() {
   return 1
 }
 set_key() { sed -i "s|^$1 = .*|$1 = \"$2\"|" "$root/etc/saccade/saccade.toml"; }
-apt_within() { within apt-get -y -qq -o Dpkg::Use-Pty=0 "$@" >>"$root.apt.log" 2>&1; }
+# Nobody is there to be asked: an edited file is kept.
+apt_within() { within apt-get -y -qq -o Dpkg::Use-Pty=0 -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold "$@" >>"$root.apt.log" 2>&1; }
 
 prove_install_and_serve() {
   local began installed tracked
@@ -104,7 +105,7 @@ prove_tls() {
   within systemctl restart saccade
   local owner=(runuser -u saccade -- saccade --data-dir /var/lib/saccade)
   check "the root is exported" wait_for 30 within sh -c "runuser -u saccade -- saccade --data-dir /var/lib/saccade trust >/tmp/root.pem"
-  check "the page opens over TLS with it" within sh -c "curl -fs --cacert /tmp/root.pem $address/ | grep -qi '<html'"
+  check "the page opens over TLS with it" wait_for 30 within sh -c "curl -fs --cacert /tmp/root.pem $address/ | grep -qi '<html'"
   check "the phone's page on trust does" within sh -c "curl -fs --cacert /tmp/root.pem $address/trust | grep -qi '<html'"
   check "so does the wearer's" within sh -c "curl -fs --cacert /tmp/root.pem $address/wearer | grep -qi '<html'"
   check_not "without the root it does not" within curl -fs $address/
@@ -112,8 +113,8 @@ prove_tls() {
   link=$(within "${owner[@]}" invite --role pilot | grep -o 'https://[^ ]*' | head -1)
   check "an invite is made (${link%%#*})" test -n "$link"
   # Once: it lets one in, and the pass is kept.
-  check "who has it comes in" within saccade --tls --trust /tmp/root.pem --invite "$link" status
-  check "and sees what is tracked" await_status '"status": "tracking"' 30
+  check "who has it comes in" within env HOME=/tmp/guest saccade --tls --trust /tmp/root.pem --invite "$link" status
+  check "and sees what is tracked" wait_for 30 within env HOME=/tmp/guest sh -c 'saccade --json status | grep -q "\"status\": \"tracking\""'
 }
 wait_for() {
   local i seconds=$1
@@ -127,7 +128,7 @@ prove_upgrade_and_removal() {
   set_key grpc 127.0.0.1:50051
   local before
   before=$(within systemctl show -p MainPID --value saccade)
-  apt_within -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold install ./opt/later.deb ||
+  apt_within install ./opt/later.deb ||
     miss "the upgrade failed, see $root.apt.log"
   check "upgraded" within sh -c 'dpkg-query -W -f "\${Version}" saccade | grep -q later'
   check "the edited file is kept" grep -q 127.0.0.1:8181 "$root/etc/saccade/saccade.toml"
@@ -160,6 +161,8 @@ prove_package() {
   inside_root apt-get update -qq && inside_root apt-get install -y -qq --no-install-recommends systemd systemd-sysv dbus \
     procps iproute2 curl ca-certificates || fail "the root cannot be prepared, see $root.apt.log"
   inside_root apt-get purge -y -qq saccade || true
+  rm -rf "$root/root" "$root/tmp"
+  mkdir -m 700 "$root/root" && mkdir -m 1777 "$root/tmp"
   cp "$deb" "$root/opt/saccade.deb"
   make_later "$deb"
   local started=$SECONDS
