@@ -208,6 +208,7 @@ absl::Status Run(const Options& options, net::Connection& connection) {
       return RunAccess(options);
     case Command::kCameras:
     case Command::kRecord:
+    case Command::kCalibrateCamera:
       break;  // asks no server
   }
   return absl::InternalError("unknown command");

@@ -56,6 +56,7 @@ absl::Status RunWithSession(cli::Options& options) {
 absl::Status RunCommand(cli::Options& options) {
   if (options.command == cli::Command::kCameras) return cli::RunCameras(options);
   if (options.command == cli::Command::kRecord) return cli::RunRecord(options);
+  if (options.command == cli::Command::kCalibrateCamera) return cli::RunCalibrateCamera(options);
   return RunWithSession(options);
 }
 

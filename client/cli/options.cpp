@@ -11,7 +11,9 @@
 #include "client/cli/access_commands.hpp"
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
+#include "client/cli/record_command.hpp"
 #include "client/cli/text.hpp"
+#include "shared/version/version.hpp"
 
 namespace saccade::cli {
 namespace {
@@ -133,21 +135,6 @@ void AddCalibrateMount(CLI::App& app, Options& options) {
                         "Write the [mount_model] table to this new TOML file; else print it");
 }
 
-void AddMachine(CLI::App& app, Options& options) {
-  app.add_subcommand("cameras", "The cameras of this machine, with their modes; needs no server");
-  CLI::App* record = app.add_subcommand(
-      "record", "Write a source as a recording that --source dataset:DIR opens; needs no server");
-  record
-      ->add_option("--source", options.record.source,
-                   "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?...]")
-      ->required();
-  record->add_option("--out", options.out, "The folder to write")->required();
-  record->add_option("--frames", options.record.frames, "Half-open range A:B of frames, from zero");
-  record->add_option("--for", options.record.seconds,
-                     "End after so many seconds; else Ctrl-C does");
-  record->add_option("--camera", options.record.camera, "camera.yaml instead of the source's own");
-}
-
 Command CommandOf(const CLI::App& app) {
   static const std::map<std::string, Command> commands = {
       {"status", Command::kStatus},
@@ -172,7 +159,8 @@ Command CommandOf(const CLI::App& app) {
       {"revoke", Command::kRevoke},
       {"audit", Command::kAudit},
       {"cameras", Command::kCameras},
-      {"record", Command::kRecord}};
+      {"record", Command::kRecord},
+      {"calibrate-camera", Command::kCalibrateCamera}};
   const CLI::App* chosen = app.get_subcommands().front();
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());
@@ -235,7 +223,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   Raw raw;
   options.connection.display_name = "saccade";
   CLI::App app("Talks to a Saccade server: what it sees, its map, its annotations.", "saccade");
-  app.set_version_flag("--version", std::string("saccade ") + SACCADE_VERSION);
+  app.set_version_flag("--version", std::string("saccade ") + Version());
   app.add_option("--server", options.connection.server, "HOST:PORT of the server's gRPC address")
       ->capture_default_str();
   app.add_option("--timeout", raw.timeout_s, "Seconds to wait for an answer")

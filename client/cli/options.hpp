@@ -41,6 +41,7 @@ enum class Command {
   kAudit,
   kCameras,  // of this machine; asks no server
   kRecord,   // likewise
+  kCalibrateCamera,
 };
 
 /// The command line, parsed and checked.
@@ -70,6 +71,7 @@ struct Options {
   double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
   struct Record {
     std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them
+    std::string board, square, lens;              // calibrate-camera
   } record;
 };
 

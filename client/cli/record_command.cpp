@@ -3,33 +3,96 @@
 #include <absl/strings/str_cat.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace saccade::cli {
+namespace {
 
-absl::Status RunRecord(const Options& options) {
+/// Words of a command line; those without a value are left out.
+void AddGiven(std::vector<std::pair<const char*, std::string>> flags,
+              std::vector<std::string>& words) {
+  for (const auto& [flag, value] : flags) {
+    if (!value.empty()) words.insert(words.end(), {flag, value});
+  }
+}
+
+/// Becomes saccade-eval, which links sources, with these arguments; returns only if it cannot.
+absl::Status BecomeEval(std::vector<std::string> words) {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::string program = (self.parent_path() / "saccade-eval").string();
-  std::vector<std::string> words = {"saccade-eval",        "record", "--source",
-                                    options.record.source, "--out",  options.out};
-  for (const auto& [flag, value] :
-       {std::pair("--frames", &options.record.frames), std::pair("--for", &options.record.seconds),
-        std::pair("--camera", &options.record.camera)}) {
-    if (!value->empty()) words.insert(words.end(), {flag, *value});
-  }
+  words.insert(words.begin(), "saccade-eval");
   std::vector<char*> argv;
   argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   execv(program.c_str(), argv.data());
-  return absl::NotFoundError(absl::StrCat(program, ": cannot be started (", std::strerror(errno),
-                                          "); sources are recorded by it: install it beside "
-                                          "saccade"));
+  return absl::NotFoundError(
+      absl::StrCat(program, ": cannot be started (", std::strerror(errno),
+                   "); sources are opened by it: install it beside saccade"));
+}
+
+}  // namespace
+
+void AddMachine(CLI::App& app, Options& options) {
+  app.add_subcommand("cameras", "The cameras of this machine, with their modes; needs no server");
+  CLI::App* record = app.add_subcommand(
+      "record", "Write a source as a recording that --source dataset:DIR opens; needs no server");
+  record
+      ->add_option("--source", options.record.source,
+                   "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?...]")
+      ->required();
+  record->add_option("--out", options.out, "The folder to write")->required();
+  record->add_option("--frames", options.record.frames, "Half-open range A:B of frames, from zero");
+  record->add_option("--for", options.record.seconds,
+                     "End after so many seconds; else Ctrl-C does");
+  record->add_option("--camera", options.record.camera, "camera.yaml instead of the source's own");
+  CLI::App* calibrate = app.add_subcommand(
+      "calibrate-camera",
+      "Find a camera's lens from a chessboard that you move before it; needs no server");
+  calibrate
+      ->add_option("--source", options.record.source,
+                   "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?...]")
+      ->required();
+  calibrate->add_option("--board", options.record.board, "Inner corners along both sides: 9x6")
+      ->required();
+  calibrate->add_option("--square", options.record.square, "Side of one square [m]: 0.025")
+      ->required();
+  calibrate->add_option("--out", options.out, "The camera.yaml to write, a new file")->required();
+  calibrate->add_option("--lens", options.record.lens,
+                        "brown_conrady (the default), or kannala_brandt for fisheyes");
+  calibrate->add_option("--frames", options.record.frames,
+                        "Half-open range A:B of frames, from zero");
+  calibrate->add_option("--for", options.record.seconds,
+                        "End after so many seconds; else a camera ends when nothing is missing");
+}
+
+absl::Status RunRecord(const Options& options) {
+  std::vector<std::string> words = {"record", "--source", options.record.source, "--out",
+                                    options.out};
+  AddGiven({{"--frames", options.record.frames},
+            {"--for", options.record.seconds},
+            {"--camera", options.record.camera}},
+           words);
+  return BecomeEval(std::move(words));
+}
+
+absl::Status RunCalibrateCamera(const Options& options) {
+  std::vector<std::string> words = {
+      "calibrate-camera",   "--source", options.record.source, "--out", options.out, "--board",
+      options.record.board, "--square", options.record.square};
+  AddGiven({{"--lens", options.record.lens},
+            {"--frames", options.record.frames},
+            {"--for", options.record.seconds}},
+           words);
+  if (options.json) words.emplace_back("--json");
+  return BecomeEval(std::move(words));
 }
 
 }  // namespace saccade::cli

@@ -4,10 +4,20 @@
 
 #include "client/cli/options.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace saccade::cli {
+
+/// `saccade cameras|record|calibrate-camera`, which need no server.
+void AddMachine(CLI::App& app, Options& options);
 
 /// `saccade record`: becomes `saccade-eval record`, which lies beside this program and links the
 /// sources. Returns only if that cannot be.
 absl::Status RunRecord(const Options& options);
+
+/// Becomes `saccade-eval calibrate-camera` likewise.
+absl::Status RunCalibrateCamera(const Options& options);
 
 }  // namespace saccade::cli

@@ -1,4 +1,9 @@
-set(SACCADE_ARCH "x86-64-v3" CACHE STRING "Value for -march=: the oldest processor to run on")
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  set(oldest armv8-a)
+else()
+  set(oldest x86-64-v3)
+endif()
+set(SACCADE_ARCH ${oldest} CACHE STRING "Value for -march=: the oldest processor to run on")
 
 # Flags that every target of ours is built with, and the shared precompiled headers.
 add_library(saccade_build_options INTERFACE)
@@ -24,7 +29,10 @@ endif()
 
 # Says in one line that the processor is too old; itself it runs on any.
 add_library(saccade_cpu_check OBJECT ${CMAKE_CURRENT_LIST_DIR}/cpu_check.cpp)
-target_compile_options(saccade_cpu_check PRIVATE -march=x86-64)
+if(SACCADE_ARCH STREQUAL x86-64-v3)
+  target_compile_options(saccade_cpu_check PRIVATE -march=x86-64)
+  target_compile_definitions(saccade_cpu_check PRIVATE SACCADE_NEEDS_X86_64_V3)
+endif()
 
 # saccade_library(NAME SOURCES ... PUBLIC ... PRIVATE ... [PCH eigen|vision|rpc])
 # A static library that carries the build options. SYSTEM keeps generated headers out of -Werror.

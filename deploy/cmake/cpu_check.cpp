@@ -1,5 +1,7 @@
 // Linked into every program and compiled for any x86-64: says in one line that the processor is too
 // old, before the first instruction of x86-64-v3 would end the program without a word.
+#ifdef SACCADE_NEEDS_X86_64_V3  // else any processor of its kind will do
+
 #include <unistd.h>
 
 #include <cstdlib>
@@ -21,3 +23,5 @@ __attribute__((constructor(101))) void CheckProcessor() {
 }
 
 }  // namespace
+
+#endif

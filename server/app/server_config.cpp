@@ -19,6 +19,7 @@
 #include "server/mount/drivers/drivers.hpp"
 #include "server/tracker/tracker_options.hpp"
 #include "shared/io/toml_file.hpp"
+#include "shared/version/version.hpp"
 
 namespace saccade {
 namespace {
@@ -84,7 +85,7 @@ std::pair<std::string, std::string> SplitKey(const std::string& key) {
 }
 
 void AddFlags(CLI::App& app, Raw& raw) {
-  app.set_version_flag("--version", std::string("saccade-server ") + kVersion);
+  app.set_version_flag("--version", std::string("saccade-server ") + Version());
   for (const Setting& setting : Settings()) {
     if (setting.flag == nullptr) continue;
     std::visit(

@@ -59,6 +59,4 @@ struct ServerConfig {
   static absl::StatusOr<std::optional<ServerConfig>> FromCommandLine(int argc, char** argv);
 };
 
-inline constexpr char kVersion[] = "0.1.0";
-
 }  // namespace saccade

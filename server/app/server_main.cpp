@@ -23,6 +23,7 @@
 #include "server/store/annotation_store.hpp"
 #include "server/tracker/tracker.hpp"
 #include "shared/io/log.hpp"
+#include "shared/version/version.hpp"
 
 namespace saccade {
 namespace {
@@ -80,7 +81,7 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
   shutdown.SetPhase("opening the data base");
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);
   if (!store.ok()) return store.status();
-  options.version = kVersion;
+  options.version = Version();
   options.mount = opened->mount.mount;
   options.crop = opened->mount.crop;
   options.every_frame = config.every_frame;

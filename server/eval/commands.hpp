@@ -1,6 +1,7 @@
 #pragma once
 
 #include <absl/status/status.h>
+#include <absl/strings/string_view.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -46,6 +47,15 @@ struct RenderArguments {
   std::filesystem::path camera;  // record: instead of the source's own camera.yaml
   double seconds = 0;            // record: end after so long; 0: with the source
 };
+struct CalibrateArguments {
+  std::string source, frames;
+  std::string board;                   // 9x6: inner corners
+  double square_m = 0;                 // side of one square
+  std::string lens = "brown_conrady";  // or kannala_brandt
+  std::filesystem::path out;
+  double seconds = 0;  // end after so long; 0: with the source, or when nothing is missing
+  bool json = false;
+};
 struct PoseGraphArguments {
   std::filesystem::path in, out;
   std::string cost = "chordal";  // or chi2
@@ -64,6 +74,11 @@ absl::Status RenderCommand(const RenderArguments& arguments);
 absl::Status RecordSimulator(const RenderArguments& arguments);
 /// Writes any source as a recording in TUM layout (RecordSource), a simulated one with its truth.
 absl::Status RecordCommand(const RenderArguments& arguments);
+/// Finds a camera's lens from a source that shows a chessboard and writes it as camera.yaml, with
+/// sigmas; refuses where the views do not determine it.
+absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments);
+/// Whether the source is paced by the world, and ends when somebody ends it.
+bool IsLive(absl::string_view uri);
 /// Optimises a pose graph in g2o's form and prints its cost before and after.
 absl::Status PoseGraphCommand(const PoseGraphArguments& arguments);
 

@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "server/eval/commands.hpp"
+#include "shared/version/version.hpp"
 
 namespace saccade {
 namespace {
@@ -135,6 +136,30 @@ void AddRecord(CLI::App& app, RenderArguments& arguments) {
       ->check(Finite());
 }
 
+void AddCalibrateCamera(CLI::App& app, CalibrateArguments& arguments) {
+  CLI::App* calibrate = app.add_subcommand(
+      "calibrate-camera", "Find a camera's lens from a chessboard that is moved before it");
+  calibrate
+      ->add_option("--source", arguments.source,
+                   "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?key=value&...]")
+      ->required();
+  calibrate->add_option("--board", arguments.board, "Inner corners along both sides: 9x6")
+      ->required();
+  calibrate->add_option("--square", arguments.square_m, "Side of one square [m]: 0.025")
+      ->required();
+  calibrate->add_option("--out", arguments.out, "The camera.yaml to write, a new file")->required();
+  calibrate->add_option("--lens", arguments.lens, "kannala_brandt for fisheyes, else brown_conrady")
+      ->check(CLI::IsMember({"brown_conrady", "kannala_brandt"}))
+      ->capture_default_str();
+  calibrate->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
+  calibrate
+      ->add_option("--for", arguments.seconds,
+                   "End after so many seconds; else a camera ends when nothing is missing")
+      ->check(CLI::Range(0.01, 1e6))
+      ->check(Finite());
+  calibrate->add_flag("--json", arguments.json, "Print report and progress as JSON");
+}
+
 /// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell
 /// starts what is in the background deaf to SIGINT, and a mask of blocked signals is inherited.
 void HearSignals() {
@@ -169,7 +194,7 @@ int Main(int argc, char** argv) {
   HearSignals();
   cv::setNumThreads(1);  // results must not depend on the machine's cores
   CLI::App app("Saccade's evaluation: runs on recordings, scores, simulation", "saccade-eval");
-  app.set_version_flag("--version", "saccade-eval " SACCADE_VERSION);
+  app.set_version_flag("--version", std::string("saccade-eval ") + Version());
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return absl::StrCat(failed->get_name(), ": ", error.what(), "; see --help\n");
@@ -178,12 +203,14 @@ int Main(int argc, char** argv) {
   ScoreArguments score;
   SimArguments sim;
   RenderArguments render, record;
+  CalibrateArguments calibrate;
   PoseGraphArguments graph;
   AddRun(app, run);
   AddScore(app, score);
   AddSim(app, sim);
   AddRender(app, render);
   AddRecord(app, record);
+  AddCalibrateCamera(app, calibrate);
   AddPoseGraph(app, graph);
   try {
     app.parse(argc, argv);
@@ -196,6 +223,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("sim")) status = SimCommand(sim);
   if (app.got_subcommand("render")) status = RenderCommand(render);
   if (app.got_subcommand("record")) status = RecordCommand(record);
+  if (app.got_subcommand("calibrate-camera")) status = CalibrateCameraCommand(calibrate);
   if (app.got_subcommand("posegraph")) status = PoseGraphCommand(graph);
   return status.ok() ? 0 : Fail(status);
 }

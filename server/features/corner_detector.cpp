@@ -1,7 +1,10 @@
 #include "server/features/corner_detector.hpp"
 
-#include <absl/strings/str_cat.h>
+#if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
+#endif
+
+#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -58,6 +61,7 @@ void Slide(const int* __restrict fresh, const int* __restrict stale, int count,
 
 void MinEigenvalues(const int* xx, const int* xy, const int* yy, int count, float* out) {
   int x = 0;
+#if defined(__AVX2__) && defined(__FMA__)
   const __m256 half = _mm256_set1_ps(0.5F);
   for (; x + 8 <= count; x += 8) {
     const auto load = [x](const int* p) {
@@ -72,6 +76,7 @@ void MinEigenvalues(const int* xx, const int* xy, const int* yy, int count, floa
         _mm256_sqrt_ps(_mm256_fmadd_ps(difference, difference, _mm256_mul_ps(b, b)));
     _mm256_storeu_ps(out + x, _mm256_sub_ps(mean, root));
   }
+#endif
   for (; x < count; ++x) {
     const float a = static_cast<float>(xx[x]);
     const float b = static_cast<float>(xy[x]);

@@ -1,6 +1,8 @@
 #include "server/features/correlation.hpp"
 
+#if defined(__AVX2__)
 #include <immintrin.h>
+#endif
 
 #include <array>
 #include <cmath>
@@ -13,6 +15,8 @@ struct Sums {
   int sum = 0;      // picture
   int squared = 0;  // picture^2
 };
+
+#if defined(__AVX2__)
 
 int HorizontalSum(__m256i v) {
   const __m128i quarter = _mm_add_epi32(_mm256_castsi256_si128(v), _mm256_extracti128_si256(v, 1));
@@ -47,6 +51,25 @@ Sums Correlate(const std::uint8_t* pixels, std::ptrdiff_t stride, const std::int
   const __m256i wide = _mm256_madd_epi16(sum, _mm256_set1_epi16(1));
   return {HorizontalSum(cross), HorizontalSum(wide), HorizontalSum(squared)};
 }
+
+#else  // arm64, and x86-64 before v3: whole numbers, so the same sums
+
+template <int kSize>
+Sums Correlate(const std::uint8_t* pixels, std::ptrdiff_t stride, const std::int16_t* templ) {
+  Sums sums;
+  for (int row = 0; row < kSize; ++row) {
+    const std::uint8_t* seen = pixels + row * stride;
+    const std::int16_t* expected = templ + row * CorrelationTemplate::kStride;
+    for (int k = 0; k < kSize; ++k) {
+      sums.cross += seen[k] * expected[k];
+      sums.sum += seen[k];
+      sums.squared += seen[k] * seen[k];
+    }
+  }
+  return sums;
+}
+
+#endif
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <string_view>
 
+#include "shared/version/version.hpp"
 #include "tests/bench/bench.hpp"
 
 namespace saccade {
@@ -93,7 +94,7 @@ void AddMap(CLI::App& app, MapBenchArguments& arguments, bool& json) {
 int Main(int argc, char** argv) {
   if (AsksForParts(argc, argv)) return RunParts(argc, argv);
   CLI::App app("Saccade's benchmarks; small parts by --benchmark_filter=REGEX", "saccade-bench");
-  app.set_version_flag("--version", "saccade-bench " SACCADE_VERSION);
+  app.set_version_flag("--version", std::string("saccade-bench ") + Version());
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return absl::StrCat(failed->get_name(), ": ", error.what(), "; see --help\n");

@@ -19,8 +19,8 @@ constexpr auto kServerOrder = std::to_array<string_view>(
      "map",      "tracker",  "anchors", "gaze",    "wearable", "overlay",  "encode",
      "store",    "identity", "rpc",     "gateway", "eval",     "app"});
 constexpr auto kClientOrder = std::to_array<string_view>({"net", "cli"});
-constexpr auto kSharedOrder =
-    std::to_array<string_view>({"io", "geometry", "time", "camera", "scene", "wire", "render"});
+constexpr auto kSharedOrder = std::to_array<string_view>(
+    {"version", "io", "geometry", "time", "camera", "scene", "wire", "render"});
 
 // Folders that see less than what is above them: only snapshots, packets and commands.
 struct Restriction {

@@ -11,13 +11,14 @@
 
 #include "server/capture/video/decoder.hpp"
 #include "server/capture/video/sandbox.hpp"
+#include "shared/version/version.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr char kHelp[] =
     "usage: saccade-decode [--after NS] < VIDEO | saccade-decode --url rtsp://HOST[:PORT]/PATH\n"
-    "       saccade-decode --try-sandbox [--network]\n"
+    "       saccade-decode --try-sandbox [--network] | --version\n"
     "Decodes a video and writes its pictures to standard output, in a form of its own.\n"
     "saccade-server starts it for file: and rtsp: sources.\n";
 
@@ -59,6 +60,9 @@ int Main(int argc, char** argv) {
       attempt = true;
     } else if (word == "--network") {
       network = true;
+    } else if (word == "--version") {
+      std::printf("saccade-decode %s\n", Version());
+      return 0;
     } else {
       const bool asked = word == "--help";
       std::fputs(kHelp, asked ? stdout : stderr);

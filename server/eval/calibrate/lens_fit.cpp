@@ -1,0 +1,210 @@
+#include "server/eval/calibrate/lens_fit.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <opencv2/calib3d.hpp>
+
+#include "server/eval/calibrate/lens_problem.hpp"
+
+namespace saccade {
+namespace {
+
+using Corners = std::vector<const std::vector<cv::Point2d>*>;
+
+constexpr double kStartHuber_px = 5, kLeastHuber_px = 0.1;
+constexpr int kStartIterations = 20, kIterations = 60, kRounds = 6;
+// A view this much worse than the median is another matter than noise.
+constexpr double kViewOutlier = 3.0, kLeastOutlier_px = 0.15;
+constexpr double kWorstRms_px = 3.0;
+
+double Median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
+double Rms(const Eigen::VectorXd& residuals) {
+  return std::sqrt(2 * residuals.squaredNorm() / static_cast<double>(residuals.size()));
+}
+
+/// Focal lengths to begin with: from the homographies, and across what lenses there are.
+std::vector<double> FocalGuesses(const Corners& views, const BoardPattern& pattern,
+                                 cv::Size picture) {
+  std::vector<double> guesses;
+  for (const double share : {0.3, 0.45, 0.7, 1.1, 1.8}) guesses.push_back(share * picture.width);
+  std::vector<std::vector<cv::Point3f>> points;
+  std::vector<std::vector<cv::Point2f>> corners;
+  const std::vector<cv::Point3d> board = pattern.Points();
+  for (const auto* view : views) {
+    points.emplace_back(board.begin(), board.end());
+    corners.emplace_back(view->begin(), view->end());
+  }
+  const cv::Mat matrix = cv::initCameraMatrix2D(points, corners, picture, 1.0);
+  const double focal = matrix.at<double>(0, 0);
+  if (focal > 0.1 * picture.width && focal < 20.0 * picture.width) guesses.push_back(focal);
+  return guesses;
+}
+
+/// The best beginning: focal length and first coefficient alone are free, the centre in the middle.
+LensProblem::State Begin(const LensProblem& problem, const Corners& views,
+                         const BoardPattern& pattern, cv::Size picture) {
+  LensProblem::State best;
+  best.cost = 1e300;
+  std::vector<bool> some(problem.parameters(), false);
+  some[0] = some[1] = some[4] = true;
+  for (const double focal : FocalGuesses(views, pattern, picture)) {
+    LensProblem::State state;
+    state.lens = Eigen::VectorXd::Zero(problem.parameters());
+    state.lens.head<4>() << focal, focal, 0.5 * (picture.width - 1), 0.5 * (picture.height - 1);
+    bool posed = true;
+    for (const auto* view : views) {
+      BoardPose pose = BoardPose::Zero();
+      posed = posed && problem.StartPose(state.lens, *view, pose);
+      state.poses.push_back(pose);
+    }
+    if (!posed) continue;
+    problem.Minimise(views, some, kStartHuber_px, kStartIterations, state);
+    if (state.cost < best.cost) best = state;
+  }
+  return best;
+}
+
+CameraIntrinsics LensOf(const Eigen::VectorXd& values, LensModel model, cv::Size picture) {
+  CameraIntrinsics lens;
+  lens.model = model;
+  lens.width = picture.width;
+  lens.height = picture.height;
+  lens.fx = values[0];
+  lens.fy = values[1];
+  lens.cx = values[2];
+  lens.cy = values[3];
+  for (Eigen::Index k = 4; k < values.size(); ++k) lens.distortion[k - 4] = values[k];
+  return lens;
+}
+
+std::vector<std::string> NamesOf(LensModel model) {
+  if (model == LensModel::kKannalaBrandt) return {"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
+  return {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
+}
+
+/// Leaves out views that fit far worse than the others, together with their poses; false: none.
+bool RejectViews(const LensProblem& problem, const LensProblem::State& state, Corners& views,
+                 std::vector<std::size_t>& indices, std::vector<BoardPose>& poses) {
+  std::vector<double> rms;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    rms.push_back(Rms(problem.Residuals(state.lens, state.poses[v], *views[v], nullptr, nullptr)));
+  }
+  const double most = std::max(kLeastOutlier_px, kViewOutlier * Median(rms));
+  Corners kept;
+  std::vector<std::size_t> kept_indices;
+  poses.clear();
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (rms[v] > most) continue;
+    kept.push_back(views[v]);
+    kept_indices.push_back(indices[v]);
+    poses.push_back(state.poses[v]);
+  }
+  const bool fewer = kept.size() < views.size();
+  views = std::move(kept);
+  indices = std::move(kept_indices);
+  return fewer;
+}
+
+void Put(const BoardPose& pose, ViewFit& view) {
+  view.rotation = {pose[0], pose[1], pose[2]};
+  view.translation_m = {pose[3], pose[4], pose[5]};
+}
+
+/// Huber's width for the residuals there are: three sigmas of their median.
+double HuberOf(const LensProblem& problem, const Corners& views, const LensProblem::State& state) {
+  std::vector<double> lengths;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const auto residuals =
+        problem.Residuals(state.lens, state.poses[v], *views[v], nullptr, nullptr);
+    for (Eigen::Index k = 0; k < residuals.size(); k += 2) {
+      lengths.push_back(residuals.segment<2>(k).norm());
+    }
+  }
+  return std::max(kLeastHuber_px, 3.0 * Median(lengths) / 1.177);  // Rayleigh's median
+}
+
+}  // namespace
+
+Eigen::Vector3d ViewFit::normal() const {
+  cv::Matx33d turn;
+  cv::Rodrigues(rotation, turn);
+  const Eigen::Vector3d z(turn(0, 2), turn(1, 2), turn(2, 2));
+  return z.z() < 0 ? Eigen::Vector3d(-z) : z;
+}
+
+absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, const BoardPattern& pattern,
+                                cv::Size picture, LensModel model) {
+  if (views.size() < 3) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the board was seen whole in ", views.size(),
+                     " views that differ; three are the least that a lens can be found from"));
+  }
+  const LensProblem problem(model, pattern);
+  Corners used;
+  std::vector<std::size_t> indices(views.size());
+  std::iota(indices.begin(), indices.end(), 0);
+  for (const BoardView& view : views) used.push_back(&view.corners);
+  LensProblem::State state = Begin(problem, used, pattern, picture);
+  const std::vector<bool> all(problem.parameters(), true);
+  double huber_px = kStartHuber_px;
+  for (int round = 0; round < kRounds && state.cost < 1e300; ++round) {
+    problem.Minimise(used, all, huber_px, kIterations, state);
+    huber_px = HuberOf(problem, used, state);
+    std::vector<BoardPose> poses;
+    if (!RejectViews(problem, state, used, indices, poses) && round > 0) break;
+    state.poses = std::move(poses);
+  }
+  if (state.cost < 1e300) problem.Minimise(used, all, huber_px, kIterations, state);
+  LensFit fit{LensOf(state.cost < 1e300 ? state.lens : Eigen::VectorXd::Ones(4), model, picture),
+              NamesOf(model),
+              state.lens,
+              {},
+              {},
+              0};
+  for (const BoardView& view : views) fit.views.push_back({view.frame, {}, {}, 0, true});
+  double squares = 0;
+  for (std::size_t v = 0; v < used.size() && state.cost < 1e300; ++v) {
+    ViewFit& view = fit.views[indices[v]];
+    Put(state.poses[v], view);
+    view.rejected = false;
+    view.rms_px = Rms(problem.Residuals(state.lens, state.poses[v], *used[v], nullptr, nullptr));
+    squares += view.rms_px * view.rms_px;
+  }
+  fit.rms_px = std::sqrt(squares / static_cast<double>(used.size()));
+  if (state.cost >= 1e300 || !(fit.rms_px < kWorstRms_px)) {
+    return absl::FailedPreconditionError(
+        "no lens explains the views: is --board the number of inner corners, the board flat and "
+        "stiff, and --lens right (a fisheye is kannala_brandt)?");
+  }
+  for (ViewFit& view : fit.views) {
+    if (!view.rejected) continue;
+    const double rms = FitView(views[&view - fit.views.data()], pattern, fit).rms_px;
+    view.rms_px = rms;
+  }
+  fit.sigmas = problem.Covariance(used, huber_px, state).diagonal().cwiseMax(0.0).cwiseSqrt();
+  return fit;
+}
+
+ViewFit FitView(const BoardView& view, const BoardPattern& pattern, const LensFit& fit) {
+  const LensProblem problem(fit.lens.model, pattern);
+  LensProblem::State state;
+  state.lens = fit.values;
+  ViewFit out{view.frame, {}, {}, 1e9, false};
+  BoardPose pose;
+  if (!problem.StartPose(state.lens, view.corners, pose)) return out;
+  state.poses = {pose};
+  const std::vector<bool> none(problem.parameters(), false);
+  problem.Minimise({&view.corners}, none, kStartHuber_px, kIterations, state);
+  Put(state.poses[0], out);
+  out.rms_px = Rms(problem.Residuals(state.lens, state.poses[0], view.corners, nullptr, nullptr));
+  return out;
+}
+
+}  // namespace saccade

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <Eigen/Dense>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "server/eval/calibrate/board.hpp"
+#include "shared/camera/camera_model.hpp"
+
+namespace saccade {
+
+/// Where the board was in one view, and how well it fits.
+struct ViewFit {
+  std::uint64_t frame = 0;
+  cv::Vec3d rotation, translation_m;  // camera_from_board, rotation as axis times angle
+  double rms_px = 0;                  // root of the mean square length of its corners' errors
+  bool rejected = false;              // a bent, blurred or wrongly found board
+  /// The board's normal in the camera: along +z if it is seen straight on.
+  Eigen::Vector3d normal() const;
+};
+
+/// A lens and what is known of it.
+struct LensFit {
+  CameraIntrinsics lens;
+  /// fx fy cx cy and the model's coefficients, one standard deviation each, from the residuals: the
+  /// larger of what independent corners and what independent views say.
+  std::vector<std::string> names;
+  Eigen::VectorXd values, sigmas;
+  std::vector<ViewFit> views;  // as given
+  double rms_px = 0;           // over the views that were not rejected
+};
+
+/// Fits `model` (kBrownConrady or kKannalaBrandt) to views of the board: least squares with Huber's
+/// weights over the lens and a pose for each view; views that fit far worse than the others are
+/// left out. FailedPrecondition: no lens explains them; what to look at.
+absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, const BoardPattern& pattern,
+                                cv::Size picture, LensModel model);
+
+/// The pose of the board in a view that had no part in the fit, with the lens held.
+ViewFit FitView(const BoardView& view, const BoardPattern& pattern, const LensFit& fit);
+
+}  // namespace saccade

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "server/eval/calibrate/board.hpp"
+#include "shared/camera/camera_model.hpp"
+
+namespace saccade {
+
+/// rotation (axis times angle) and translation of camera_from_board.
+using BoardPose = Eigen::Matrix<double, 6, 1>;
+
+/// Least squares over one lens and the board's pose in each view: the lens parameters are [fx fy cx
+/// cy coefficients], poses are eliminated view by view.
+class LensProblem {
+ public:
+  LensProblem(LensModel model, const BoardPattern& pattern);
+
+  int parameters() const { return fisheye_ ? 8 : 9; }
+  /// Pose by perspective-n-point with this lens; false where that has no answer.
+  bool StartPose(const Eigen::VectorXd& lens, const std::vector<cv::Point2d>& corners,
+                 BoardPose& pose) const;
+  /// Corners predicted minus `corners`, interleaved x y; the Jacobians if asked for.
+  Eigen::VectorXd Residuals(const Eigen::VectorXd& lens, const BoardPose& pose,
+                            const std::vector<cv::Point2d>& corners, Eigen::MatrixXd* by_lens,
+                            Eigen::MatrixXd* by_pose) const;
+
+  struct State {
+    Eigen::VectorXd lens;
+    std::vector<BoardPose> poses;
+    double cost = 0;  // Huber's, over all views
+  };
+  /// Levenberg-Marquardt over the lens parameters that `free` names (by index; none: poses alone)
+  /// and all poses.
+  void Minimise(const std::vector<const std::vector<cv::Point2d>*>& views,
+                const std::vector<bool>& free, double huber_px, int iterations, State& state) const;
+  /// Covariance of the lens at the minimum: per entry of the diagonal the larger of that of
+  /// independent corners and that of independent views.
+  Eigen::MatrixXd Covariance(const std::vector<const std::vector<cv::Point2d>*>& views,
+                             double huber_px, const State& state) const;
+
+ private:
+  struct Normal;  // one view's share of the normal equations
+  Normal Accumulate(const Eigen::VectorXd& lens, const BoardPose& pose,
+                    const std::vector<cv::Point2d>& corners, const std::vector<bool>& free,
+                    double huber_px) const;
+  double Cost(const std::vector<const std::vector<cv::Point2d>*>& views, double huber_px,
+              const State& state) const;
+
+  bool fisheye_;
+  std::vector<cv::Point3d> points_;
+};
+
+}  // namespace saccade

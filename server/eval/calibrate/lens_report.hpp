@@ -1,0 +1,41 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "server/eval/calibrate/lens_fit.hpp"
+#include "server/eval/calibrate/view_picker.hpp"
+
+namespace saccade {
+
+/// A calibration with what speaks for it.
+struct LensReport {
+  std::string source;
+  BoardPattern pattern;
+  LensFit fit;
+  std::vector<ViewFit> held_out;  // views that had no part in the fit
+  double held_out_rms_px = 0;
+  double covered = 0;              // share of the picture that corners were in
+  std::vector<int> counts;         // corners in each part of it, ViewPicker's
+  int tilted_x = 0, tilted_y = 0;  // views whose normal leans so, by the lens found
+};
+
+/// Every fifth view is held out where there are ten; the others are fitted.
+absl::StatusOr<LensReport> Calibrate(const std::string& source, const ViewPicker& picker,
+                                     const BoardPattern& pattern, cv::Size picture,
+                                     LensModel model);
+
+/// Whether that is enough to be believed. FailedPrecondition: too few views or tilts, a focal
+/// length or centre that the views do not determine, too little of the picture, other views that it
+/// does not fit: what, and what to do about it.
+absl::Status Judge(const LensReport& report);
+
+/// For people: parameters with sigmas, residuals by view, the picture's parts.
+std::string ReportText(const LensReport& report);
+nlohmann::ordered_json ReportJson(const LensReport& report);
+/// What camera.yaml says of how it was made: lines, the first `#` left out.
+std::string CameraFileHeader(const LensReport& report);
+
+}  // namespace saccade
