@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <opencv2/calib3d.hpp>
+#include <optional>
 
 #include "server/eval/calibrate/lens_problem.hpp"
 
@@ -19,6 +19,7 @@ constexpr int kStartIterations = 20, kIterations = 60, kRounds = 6;
 // A view this much worse than the median is another matter than noise.
 constexpr double kViewOutlier = 3.0, kLeastOutlier_px = 0.15;
 constexpr double kWorstRms_px = 3.0;
+constexpr double kNoCost = 1e300;  // nothing found
 
 double Median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
@@ -51,7 +52,7 @@ std::vector<double> FocalGuesses(const Corners& views, const BoardPattern& patte
 LensProblem::State Begin(const LensProblem& problem, const Corners& views,
                          const BoardPattern& pattern, cv::Size picture) {
   LensProblem::State best;
-  best.cost = 1e300;
+  best.cost = kNoCost;
   std::vector<bool> some(problem.parameters(), false);
   some[0] = some[1] = some[4] = true;
   for (const double focal : FocalGuesses(views, pattern, picture)) {
@@ -130,6 +131,56 @@ double HuberOf(const LensProblem& problem, const Corners& views, const LensProbl
   return std::max(kLeastHuber_px, 3.0 * Median(lengths) / 1.177);  // Rayleigh's median
 }
 
+/// The lens, and which views it was fitted to.
+struct Solution {
+  LensProblem::State state;
+  Corners used;
+  std::vector<std::size_t> indices;  // of `used`, in all views
+  double huber_px = kStartHuber_px;
+};
+
+/// Nothing if no beginning leads anywhere.
+std::optional<Solution> Solve(const LensProblem& problem, const std::vector<BoardView>& views,
+                              const BoardPattern& pattern, cv::Size picture) {
+  Solution solution;
+  for (const BoardView& view : views) {
+    solution.indices.push_back(solution.used.size());
+    solution.used.push_back(&view.corners);
+  }
+  solution.state = Begin(problem, solution.used, pattern, picture);
+  if (!(solution.state.cost < kNoCost)) return std::nullopt;
+  const std::vector<bool> all(problem.parameters(), true);
+  for (int round = 0; round < kRounds; ++round) {
+    problem.Minimise(solution.used, all, solution.huber_px, kIterations, solution.state);
+    solution.huber_px = HuberOf(problem, solution.used, solution.state);
+    std::vector<BoardPose> poses;
+    const bool fewer = RejectViews(problem, solution.state, solution.used, solution.indices, poses);
+    solution.state.poses = std::move(poses);
+    if (!fewer && round > 0) break;
+  }
+  problem.Minimise(solution.used, all, solution.huber_px, kIterations, solution.state);
+  return solution;
+}
+
+/// One entry for each view: how it fits, or that it was left out, and how it would have.
+void DescribeViews(const LensProblem& problem, const Solution& solution,
+                   const std::vector<BoardView>& views, const BoardPattern& pattern, LensFit& fit) {
+  for (const BoardView& view : views) {
+    fit.views.push_back(FitView(view, pattern, fit));
+    fit.views.back().rejected = true;
+  }
+  double squares = 0;
+  for (std::size_t v = 0; v < solution.used.size(); ++v) {
+    ViewFit& view = fit.views[solution.indices[v]];
+    Put(solution.state.poses[v], view);
+    view.rejected = false;
+    view.rms_px = Rms(problem.Residuals(solution.state.lens, solution.state.poses[v],
+                                        *solution.used[v], nullptr, nullptr));
+    squares += view.rms_px * view.rms_px;
+  }
+  fit.rms_px = std::sqrt(squares / static_cast<double>(solution.used.size()));
+}
+
 }  // namespace
 
 Eigen::Vector3d ViewFit::normal() const {
@@ -147,48 +198,23 @@ absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, const Board
                      " views that differ; three are the least that a lens can be found from"));
   }
   const LensProblem problem(model, pattern);
-  Corners used;
-  std::vector<std::size_t> indices(views.size());
-  std::iota(indices.begin(), indices.end(), 0);
-  for (const BoardView& view : views) used.push_back(&view.corners);
-  LensProblem::State state = Begin(problem, used, pattern, picture);
-  const std::vector<bool> all(problem.parameters(), true);
-  double huber_px = kStartHuber_px;
-  for (int round = 0; round < kRounds && state.cost < 1e300; ++round) {
-    problem.Minimise(used, all, huber_px, kIterations, state);
-    huber_px = HuberOf(problem, used, state);
-    std::vector<BoardPose> poses;
-    if (!RejectViews(problem, state, used, indices, poses) && round > 0) break;
-    state.poses = std::move(poses);
+  const std::optional<Solution> solution = Solve(problem, views, pattern, picture);
+  LensFit fit;
+  if (solution) {
+    fit.lens = LensOf(solution->state.lens, model, picture);
+    fit.names = NamesOf(model);
+    fit.values = solution->state.lens;
+    DescribeViews(problem, *solution, views, pattern, fit);
   }
-  if (state.cost < 1e300) problem.Minimise(used, all, huber_px, kIterations, state);
-  LensFit fit{LensOf(state.cost < 1e300 ? state.lens : Eigen::VectorXd::Ones(4), model, picture),
-              NamesOf(model),
-              state.lens,
-              {},
-              {},
-              0};
-  for (const BoardView& view : views) fit.views.push_back({view.frame, {}, {}, 0, true});
-  double squares = 0;
-  for (std::size_t v = 0; v < used.size() && state.cost < 1e300; ++v) {
-    ViewFit& view = fit.views[indices[v]];
-    Put(state.poses[v], view);
-    view.rejected = false;
-    view.rms_px = Rms(problem.Residuals(state.lens, state.poses[v], *used[v], nullptr, nullptr));
-    squares += view.rms_px * view.rms_px;
-  }
-  fit.rms_px = std::sqrt(squares / static_cast<double>(used.size()));
-  if (state.cost >= 1e300 || !(fit.rms_px < kWorstRms_px)) {
+  if (!solution || !(fit.rms_px < kWorstRms_px)) {
     return absl::FailedPreconditionError(
         "no lens explains the views: is --board the number of inner corners, the board flat and "
         "stiff, and --lens right (a fisheye is kannala_brandt)?");
   }
-  for (ViewFit& view : fit.views) {
-    if (!view.rejected) continue;
-    const double rms = FitView(views[&view - fit.views.data()], pattern, fit).rms_px;
-    view.rms_px = rms;
-  }
-  fit.sigmas = problem.Covariance(used, huber_px, state).diagonal().cwiseMax(0.0).cwiseSqrt();
+  fit.sigmas = problem.Covariance(solution->used, solution->huber_px, solution->state)
+                   .diagonal()
+                   .cwiseMax(0.0)
+                   .cwiseSqrt();
   return fit;
 }
 

@@ -138,6 +138,33 @@ double LensProblem::Cost(const std::vector<const std::vector<cv::Point2d>*>& vie
   return std::isfinite(cost) ? cost : 1e300;
 }
 
+LensProblem::State LensProblem::Stepped(const State& state, const std::vector<Normal>& normals,
+                                        const std::vector<bool>& free, double damping) const {
+  MatrixXd reduced = MatrixXd::Zero(parameters(), parameters());
+  VectorXd right = VectorXd::Zero(parameters());
+  std::vector<Eigen::LDLT<Eigen::Matrix<double, 6, 6>>> solvers;
+  for (const Normal& normal : normals) {
+    Eigen::Matrix<double, 6, 6> pose_pose = normal.pose_pose;
+    pose_pose.diagonal() *= 1 + damping;
+    solvers.emplace_back(pose_pose);
+    MatrixXd lens_lens = normal.lens_lens;
+    lens_lens.diagonal() *= 1 + damping;
+    reduced += lens_lens - normal.lens_pose * solvers.back().solve(normal.lens_pose.transpose());
+    right += normal.lens_gradient - normal.lens_pose * solvers.back().solve(normal.pose_gradient);
+  }
+  for (int k = 0; k < parameters(); ++k) {
+    if (!free[k]) reduced(k, k) = 1;  // its step is nothing
+  }
+  const VectorXd step = -reduced.ldlt().solve(right);
+  State next = state;
+  next.lens += step;
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    next.poses[v] -=
+        solvers[v].solve(normals[v].pose_gradient + normals[v].lens_pose.transpose() * step);
+  }
+  return next;
+}
+
 void LensProblem::Minimise(const std::vector<const std::vector<cv::Point2d>*>& views,
                            const std::vector<bool>& free, double huber_px, int iterations,
                            State& state) const {
@@ -151,30 +178,7 @@ void LensProblem::Minimise(const std::vector<const std::vector<cv::Point2d>*>& v
     bool better = false;
     double gain = 0;
     for (; !better && damping < 1e9; damping *= better ? 0.1 : 10) {
-      MatrixXd reduced = MatrixXd::Zero(parameters(), parameters());
-      VectorXd right = VectorXd::Zero(parameters());
-      std::vector<Eigen::LDLT<Eigen::Matrix<double, 6, 6>>> solvers;
-      for (const Normal& normal : normals) {
-        Eigen::Matrix<double, 6, 6> pose_pose = normal.pose_pose;
-        pose_pose.diagonal() *= 1 + damping;
-        solvers.emplace_back(pose_pose);
-        MatrixXd lens_lens = normal.lens_lens;
-        lens_lens.diagonal() *= 1 + damping;
-        reduced +=
-            lens_lens - normal.lens_pose * solvers.back().solve(normal.lens_pose.transpose());
-        right +=
-            normal.lens_gradient - normal.lens_pose * solvers.back().solve(normal.pose_gradient);
-      }
-      for (int k = 0; k < parameters(); ++k) {
-        if (!free[k]) reduced(k, k) = 1;  // its step is nothing
-      }
-      const VectorXd step = -reduced.ldlt().solve(right);
-      State next = state;
-      next.lens += step;
-      for (std::size_t v = 0; v < views.size(); ++v) {
-        next.poses[v] -=
-            solvers[v].solve(normals[v].pose_gradient + normals[v].lens_pose.transpose() * step);
-      }
+      State next = Stepped(state, normals, free, damping);
       next.cost = next.lens[0] > 0 && next.lens[1] > 0 ? Cost(views, huber_px, next) : 1e300;
       better = next.cost < state.cost;
       if (!better) continue;

@@ -46,6 +46,9 @@ class LensProblem {
   Normal Accumulate(const Eigen::VectorXd& lens, const BoardPose& pose,
                     const std::vector<cv::Point2d>& corners, const std::vector<bool>& free,
                     double huber_px) const;
+  /// One damped step from `state`.
+  State Stepped(const State& state, const std::vector<Normal>& normals,
+                const std::vector<bool>& free, double damping) const;
   double Cost(const std::vector<const std::vector<cv::Point2d>*>& views, double huber_px,
               const State& state) const;
 
