@@ -41,8 +41,11 @@ std::optional<Timestamp> PhoneClock::measured_offset() const {
 std::optional<Timestamp> PhoneClock::ToMonotonic(Timestamp phone_ns, Timestamp received_ns) {
   if (!Plausible(phone_ns)) return std::nullopt;
   const Timestamp by_arrival = arrivals_.ToMonotonic(phone_ns, received_ns) - phone_ns;
-  const Timestamp wanted = measured_offset().value_or(by_arrival);
-  const bool near = offset_ns_ && std::abs(wanted - *offset_ns_) < kJump_ns;
+  const std::optional<Timestamp> measured = measured_offset();
+  const Timestamp wanted = measured.value_or(by_arrival);
+  // From one measurement to a better one; whatever is taken for one before the first is far off.
+  const bool near = was_measured_ && std::abs(wanted - *offset_ns_) < kJump_ns;
+  was_measured_ = measured.has_value();
   offset_ns_ = near ? *offset_ns_ + std::clamp(wanted - *offset_ns_, -kSlew_ns, kSlew_ns) : wanted;
   const Timestamp time_ns =
       std::clamp(phone_ns + *offset_ns_, received_ns - kOldest_ns, received_ns);

@@ -35,6 +35,7 @@ class PhoneClock {
   std::size_t count_ = 0;
   StreamClock arrivals_;
   std::optional<Timestamp> offset_ns_;  // in use: follows what is measured, slowly
+  bool was_measured_ = false;
   Timestamp last_ns_ = 0;
 };
 

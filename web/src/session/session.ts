@@ -1,6 +1,6 @@
 import type { AccessUnit } from '../gen/saccade/v1/video_pb';
 import { VideoView } from '../gen/saccade/v1/video_pb';
-import type { Event, JoinResponse } from '../gen/saccade/v1/session_pb';
+import type { Event, JoinResponse, Topic } from '../gen/saccade/v1/session_pb';
 import type { Clients } from '../transport/clients';
 import { Backoff } from '../transport/backoff';
 import { isRefusal, isReplaced, streamEndWords } from '../transport/errors';
@@ -34,6 +34,7 @@ export interface SessionOptions {
   readonly role: Role;
   readonly view: View;
   readonly name: string;
+  readonly topics?: Topic[]; // absent: all
   /** Where the session is kept for a reload; without it, only while the page lives. */
   readonly kept?: KeptSession;
   /** The other tabs of this browser, where they can be asked. */
@@ -178,7 +179,7 @@ export class Session {
 
   private async runOnce(attempt: AbortController): Promise<void> {
     const { signal } = attempt;
-    const { view } = this.options;
+    const { view, topics = [] } = this.options;
     await this.options.enter?.(signal);
     const joined = await this.joining.join(
       signal,
@@ -197,6 +198,7 @@ export class Session {
         {
           sessionId: joined.sessionId,
           window: WINDOW,
+          topics,
           videoView: view === 'raw' ? VideoView.RAW : VideoView.AUGMENTED,
         },
         { signal },
