@@ -55,6 +55,7 @@ export class Session {
   link: Link = { kind: 'connecting' };
   joined: JoinResponse | undefined;
   pose: Pose | undefined;
+  poseMs = 0; // when that came, this page's clock
   sourceEnded = false;
   participants: readonly Participant[] = [];
   statistics: Statistics | undefined;
@@ -290,6 +291,7 @@ export class Session {
   private receivePose(pose: Pose): void {
     if (this.pose && pose.mapRevision !== this.pose.mapRevision) this.path.length = 0;
     this.pose = pose;
+    this.poseMs = this.lastEventMs;
     if (!isPlaced(pose)) return;
     this.path.push(pose);
     if (this.path.length > 9000) this.path.splice(0, 3000);

@@ -35,7 +35,7 @@ export class WearScreen {
       h(
         'p',
         {},
-        'The experts you invited see what its camera sees, and place marks in it that you see here. Nothing is heard.',
+        'Experts who were invited see what its camera sees, and place marks in it that you see here. Nothing is heard.',
       ),
       h('p', {}, 'Tap Start and allow the camera. The screen stays on until you leave this page.'),
       this.failure,

@@ -3,10 +3,11 @@
 // places marks. Where this may make network namespaces, each has a network of its own, and the phone's is cut
 // (SACCADE_CUT_S, 4 s by default).
 import { execFileSync, spawnSync } from 'node:child_process';
-import { writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { Expert } from './expert.mjs';
 import { trust } from './invite.mjs';
+import { inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
 import { median } from './pictures.mjs';
 import { startServer, Truth } from './server.mjs';
 
@@ -14,6 +15,7 @@ const FRAMES = 300; // played to and fro: 20 s without a jump
 const BITS = 9;
 const BLOCK = { width: 16, height: 8 }; // of a bit, in the uppermost rows: no feature is looked for there
 const PHONE = { width: 390, height: 844 };
+const AIM_PX = 15; // a click farther than this from its object missed it: taken back, tried again
 const OUT_MS = 1000;
 const CUT_S = Number(process.env['SACCADE_CUT_S'] ?? 4);
 const MARKS = Number(process.env['SACCADE_MARKS'] ?? 4);
@@ -77,6 +79,15 @@ function makeVideo(binary, folder, source) {
   return { video, camera: join(recording, 'camera.yaml') };
 }
 
+/** As optics.mjs takes it. */
+function lensOf(yaml) {
+  const value = (key) => JSON.parse(new RegExp(`^${key}: (.*)$`, 'm').exec(yaml)[1]);
+  return {
+    ...{ fxPx: value('fx'), fyPx: value('fy'), cxPx: value('cx'), cyPx: value('cy') },
+    distortion: value('distortion'),
+  };
+}
+
 /** Where each object is in each picture that is played. */
 async function truthOf(binary, folder, source) {
   const file = join(folder, 'truth.jsonl');
@@ -130,20 +141,17 @@ export async function runWear({ server: binary, chromium, seed, shots, folder })
   const data = join(folder, 'data');
   const inServer = networks?.server ?? [];
   context.saccade = (...words) => {
-    const [command, ...rest] = [
-      ...inServer,
-      join(dirname(binary), 'saccade'),
-      ...words,
-      '--data-dir',
-      data,
-    ];
-    return execFileSync(command, rest, { encoding: 'utf8' });
+    const cli = join(dirname(binary), 'saccade');
+    const [command, ...rest] = [...inServer, cli, '--data-dir', data, ...words];
+    const env = { ...process.env, HOME: folder, XDG_CONFIG_HOME: join(folder, 'config') };
+    return execFileSync(command, rest, { encoding: 'utf8', env });
   };
   try {
     const source = `sim:desk?seed=${seed}&motion=desk&auto_exposure=off&fps=60`;
     const { video, camera } = makeVideo(binary, folder, source);
     context.truth = await truthOf(binary, folder, source);
     context.video = video;
+    context.camera = lensOf(readFileSync(camera, 'utf8'));
     const config = join(folder, 'server.toml');
     writeFileSync(config, '[tls]\nrequired = true\n[auth]\nrequired = true\n');
     const host = networks?.host ?? '127.0.0.1';
@@ -230,21 +238,9 @@ async function openPhone(context, link, home) {
   await page.locator('.wear-view[data-uplink="live"]').waitFor({ timeout: 20_000 });
   check('the phone is the camera', true, `${Date.now() - begin} ms after the tap`);
   const tracked = page.locator('.line', { hasText: /tracking/ }).waitFor({ timeout: 30_000 });
-  if (process.env['SACCADE_VERBOSE']) {
-    for (let i = 0; i < 10; ++i) {
-      await sleep(2000);
-      const [line, view] = [page.locator('.line'), page.locator('.wear-view')];
-      const words = [await line.innerText(), await page.locator('.latency').innerText()];
-      console.log(`      ${words.join(' | ')} | ${await view.getAttribute('data-latency')}`);
-    }
-  }
   await tracked.catch(async (error) => {
     const view = page.locator('.wear-view');
-    console.log(
-      await view.innerText(),
-      await view.getAttribute('data-latency'),
-      context.saccade('status'),
-    );
+    console.log(await view.innerText(), await view.getAttribute('data-latency'));
     throw error;
   });
   check('and is tracked', true, `${Date.now() - begin} ms after the tap`);
@@ -255,8 +251,11 @@ async function openExpert(context, link, home) {
   context.expert = await Expert.open(chromium, link, { home, prefix: networks?.expert ?? [] });
   await context.expert.waitForStatus(/^tracking/, 30_000);
   await context.expert.page.locator('.app[data-first-picture-ms]').waitFor();
-  const status = saccade('status');
-  check('`saccade status` says tracked', /tracking/.test(status), status.split('\n')[0]);
+  const viewer = JSON.parse(saccade('invite', '--role', 'viewer', '--json')).link;
+  const grpc = context.server.grpc.replace('0.0.0.0', networks?.host);
+  const whom = ['--trust', join(context.folder, 'root.pem'), '--invite', viewer, '--server', grpc];
+  const status = saccade(...whom, 'status').replace(/\s+/g, ' ');
+  check('`saccade status` says tracking', /tracking/.test(status), status.slice(0, 90));
   await shot(context, context.expert, 'expert');
 }
 
@@ -266,47 +265,73 @@ async function marks(context) {
   await expert.press('c');
   await expert.enlarge('video');
   const placed = [];
-  for (const end = Date.now() + 30_000; placed.length < MARKS && Date.now() < end; ) {
-    const { number } = await shownBy(expert.page);
-    const { left, top, scale, width, height } = await expert.look();
-    const objects = truth.frame(number)?.objects ?? [];
-    const target = objects.find(({ name, visible, pixel }) => {
-      if (!visible || !pixel || placed.some((mark) => mark.name === name)) return false;
-      const [u, v] = pixel;
-      return u > 60 && v > 60 && u < width - 60 && v < height - 60;
-    });
-    if (!target) continue;
-    const before = await expert.annotationIds();
-    const [u, v] = target.pixel;
-    await expert.click([left + (u + 0.5) * scale, top + (v + 0.5) * scale]);
-    const { id, refused } = await expert.newAnnotation(before);
-    if (id) placed.push({ id, name: target.name });
-    else if (process.env['SACCADE_VERBOSE']) console.log(`      ${target.name}: ${refused}`);
+  for (const end = Date.now() + 40_000; placed.length < MARKS && Date.now() < end; ) {
+    const mark = await placeMark(context, placed);
+    if (mark) placed.push(mark);
   }
   await shot(context, expert, 'marks-expert');
-  // On the phone, over its own picture: where each mark is drawn, against where its object is in it.
+  // On the phone, over its own picture: where each mark is, against where truth has it in that very picture.
   const errors = placed.map(() => []);
   const seen = new Set();
-  for (const end = Date.now() + 8000; Date.now() < end; await sleep(40)) {
+  for (const end = Date.now() + 10_000; Date.now() < end; await sleep(30)) {
     const shown = await shownBy(phone.page);
     const frame = truth.frame(shown.number);
-    if (!frame || seen.has(shown.frameId) || shown.marks.length !== placed.length) continue;
+    if (!frame || !shown.frameId || seen.has(shown.frameId)) continue;
     seen.add(shown.frameId);
-    placed.forEach(({ name }, i) => {
-      const pixel = frame.objects.find((object) => object.name === name)?.pixel;
-      const nearest = shown.marks
-        .filter((at) => at.length === 2)
-        .map(([u, v]) => Math.hypot(u - pixel?.[0], v - pixel?.[1]));
-      if (pixel && nearest.length > 0) errors[i].push(Math.min(...nearest));
+    placed.forEach(({ point }, i) => {
+      const at = project(context.camera, inCamera(frame.world_from_camera, point));
+      if (!at || at[0] < 0 || at[1] < 0 || at[0] > 639 || at[1] > 479) return;
+      const away = shown.marks.map((pixel) => length(minus(pixel, at))).filter((px) => px >= 0);
+      if (away.length > 0) errors[i].push(Math.min(...away));
     });
   }
   await shot(context, phone, 'marks-phone');
   const each = errors.map((list) => median(list));
   check(
-    "marks placed in the expert's video are at the right things on the phone, median within 8 px",
-    placed.length === MARKS && each.every((error) => error < 8) && seen.size > 20,
+    "marks placed in the expert's video are where truth has them on the phone, each median within 8 px",
+    placed.length === MARKS && each.every((error) => error < 8) && seen.size > 10,
     `${placed.length} marks, ${seen.size} pictures, by mark ${each.map((e) => e?.toFixed(1)).join(', ')} px`,
   );
+}
+
+/** One cube on an object; undefined if it was missed, as the camera moves on, or refused. */
+async function placeMark({ expert, truth, camera }, placed) {
+  const numbers = new Map(); // of the expert's frames
+  const look = async () => {
+    const { frameId, number } = await shownBy(expert.page);
+    numbers.set(frameId, number);
+    return number;
+  };
+  const { left, top, scale, width, height } = await expert.look();
+  const target = truth.frame(await look())?.objects.find(({ name, visible, pixel }) => {
+    if (!visible || !pixel || placed.some((mark) => mark.name === name)) return false;
+    const [u, v] = pixel;
+    return u > 60 && v > 60 && u < width - 60 && v < height - 60;
+  });
+  if (!target) return undefined;
+  const before = await expert.annotationIds();
+  const [u, v] = target.pixel;
+  const looking = (async () => {
+    for (let i = 0; i < 8; ++i) await look();
+  })();
+  await expert.click([left + (u + 0.5) * scale, top + (v + 0.5) * scale]);
+  await looking;
+  const { id, refused } = await expert.newAnnotation(before);
+  if (!id) {
+    if (process.env['SACCADE_VERBOSE']) console.log(`      ${target.name}: ${refused}`);
+    return undefined;
+  }
+  const { id: frameId, pixel } = await expert.pressed();
+  const frame = truth.frame(numbers.get(frameId));
+  const object = frame?.objects.find(({ name }) => name === target.name);
+  if (object?.pixel && object.visible && length(minus(object.pixel, pixel)) < AIM_PX) {
+    const depth = inCamera(frame.world_from_camera, object.point_in_world_m)[2];
+    const point = inWorld(frame.world_from_camera, unproject(camera, pixel, depth));
+    return { id, name: target.name, point };
+  }
+  await expert.press('Control+z'); // missed
+  await sleep(500);
+  return undefined;
 }
 
 async function latency({ check, phone, expert }) {
@@ -332,6 +357,12 @@ async function cut(context) {
   await sleep(CUT_S * 1000);
   await shot(context, phone, 'cut-phone');
   await shot(context, expert, 'cut-expert');
+  const drawn = await phone.page.evaluate(() => {
+    const canvas = document.querySelector('canvas.marks');
+    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    return data.filter((value, i) => i % 4 === 3 && value > 0).length;
+  });
+  check('a picture whose pose is not known has no marks', drawn === 0, `${drawn} pixels`);
   const during = await phone.page.locator('.line').innerText();
   const expertDuring = (await expert.page.locator('header .status').innerText()).replace(
     /\n/g,

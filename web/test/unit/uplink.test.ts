@@ -12,6 +12,8 @@ import { Camera, type Intrinsics } from '../../src/geometry/camera';
 import { IDENTITY } from '../../src/geometry/rigid3';
 import { uprightView } from '../../src/geometry/turned_view';
 import { makeView, projectPoint } from '../../src/geometry/view';
+import type { Pose } from '../../src/session/types';
+import { statusWords } from '../../src/ui/words';
 import { wearWords } from '../../src/ui/wear_words';
 import { BitRate, held } from '../../src/uplink/back_pressure';
 import { FrameTimes, refusalWords } from '../../src/uplink/camera';
@@ -248,6 +250,28 @@ describe('wearWords', () => {
     expect(wearWords({ ...fine, paused: true }).warn).toBe(true);
     expect(wearWords({ ...fine, problem: 'pictures of 3x2 came' }).text).toMatch(/3x2/);
     expect(wearWords({ ...fine, untrackedMs: 2000 }).text).toMatch(/tracks nothing/);
+  });
+});
+
+describe('statusWords', () => {
+  const pose: Pose = {
+    frameId: 1,
+    status: 'tracking',
+    quality: 'good',
+    advice: '',
+    metric: false,
+    worldFromCamera: IDENTITY,
+    attempted: 9,
+    matched: 9,
+    mapRevision: 1,
+  };
+  it('does not say tracking while no picture comes', () => {
+    const input = { link: { kind: 'live' }, pose, sourceEnded: false, nowMs: 10_000 } as const;
+    expect(statusWords({ ...input, poseMs: 9000 }).text).toBe('tracking good');
+    const away = statusWords({ ...input, poseMs: 6000 });
+    expect(away).toMatchObject({ text: 'no picture for 4 s', warn: true });
+    expect(away.advice).toMatch(/phone may be away/);
+    expect(statusWords({ ...input, poseMs: 6000, sourceEnded: true }).text).toBe('recording ended');
   });
 });
 
