@@ -18,7 +18,7 @@ const PHONE = { width: 390, height: 844 };
 const AIM_PX = 15; // a click farther than this from its object missed it: taken back, tried again
 const OUT_MS = 1000;
 const CUT_S = Number(process.env['SACCADE_CUT_S'] ?? 4);
-const MARKS = Number(process.env['SACCADE_MARKS'] ?? 4);
+const MARKS = Number(process.env['SACCADE_MARKS'] ?? 3);
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const ip = (...words) => spawnSync('ip', words).status === 0;
@@ -265,7 +265,7 @@ async function marks(context) {
   await expert.press('c');
   await expert.enlarge('video');
   const placed = [];
-  for (const end = Date.now() + 40_000; placed.length < MARKS && Date.now() < end; ) {
+  for (const end = Date.now() + 90_000; placed.length < MARKS && Date.now() < end; ) {
     const mark = await placeMark(context, placed);
     if (mark) placed.push(mark);
   }
@@ -360,9 +360,18 @@ async function cut(context) {
   const drawn = await phone.page.evaluate(() => {
     const canvas = document.querySelector('canvas.marks');
     const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-    return data.filter((value, i) => i % 4 === 3 && value > 0).length;
+    const pixels = data.filter((value, i) => i % 4 === 3 && value > 0).length;
+    return {
+      pixels,
+      of: canvas.dataset.frameId,
+      line: document.querySelector('.line').textContent,
+    };
   });
-  check('a picture whose pose is not known has no marks', drawn === 0, `${drawn} pixels`);
+  check(
+    'a picture whose pose is not known has no marks',
+    drawn.pixels === 0,
+    JSON.stringify(drawn),
+  );
   const during = await phone.page.locator('.line').innerText();
   const expertDuring = (await expert.page.locator('header .status').innerText()).replace(
     /\n/g,
