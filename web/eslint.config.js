@@ -7,6 +7,7 @@ const layers = {
   transport: ['scene', 'tools', 'ui', 'session', 'decode'],
   decode: ['scene', 'tools', 'ui', 'session', 'transport'],
   session: ['scene', 'tools', 'ui'],
+  uplink: ['scene', 'tools', 'ui', 'session', 'decode'],
   tools: ['scene', 'ui', 'transport'],
   scene: ['ui', 'transport'],
 };
@@ -54,7 +55,7 @@ export default tseslint.config(
               group: [`../${name}/*`],
               message: `${folder} must not see ${name}`,
             })),
-            ...(['geometry', 'session', 'transport', 'decode', 'tools'].includes(folder)
+            ...(['geometry', 'session', 'transport', 'uplink', 'decode', 'tools'].includes(folder)
               ? [{ group: ['three', 'three/*'], message: 'three.js belongs to scene' }]
               : []),
           ],

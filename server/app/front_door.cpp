@@ -126,8 +126,13 @@ std::string FrontDoor::BaseUrl(int http_port) const {
                       outside.ToString(http_port));
 }
 
+const char* FrontDoor::WearerPath() const {
+  return absl::StartsWith(config_.source, "phone:") ? "/wear" : "/wearer";
+}
+
 std::string FrontDoor::LinkOf(AccessRole role, const std::string& token) const {
-  return absl::StrCat(base_url_, role == AccessRole::kWearer ? "/wearer" : "/", "#invite=", token);
+  return absl::StrCat(base_url_, role == AccessRole::kWearer ? WearerPath() : "/",
+                      "#invite=", token);
 }
 
 absl::Status FrontDoor::Announce(int grpc_port, int http_port) {
@@ -135,6 +140,10 @@ absl::Status FrontDoor::Announce(int grpc_port, int http_port) {
   if (insecure()) {
     Log("saccade-server: INSECURE: other machines reach this server without TLS; whoever is on the "
         "network sees and changes everything");
+  }
+  const bool by_phone = absl::StartsWith(config_.source, "phone:");
+  if (by_phone && !config_.auth_required) {
+    Log(absl::StrCat("waiting for the phone: open ", base_url_, WearerPath(), " on it"));
   }
   if (!config_.auth_required) return absl::OkStatus();
   // A given certificate has no name like 127.0.0.1; whom it is by is the system's store to say, or
@@ -159,6 +168,12 @@ void FrontDoor::SayInvites() {
   if (identity_ && !identity_->root_pem.empty()) {
     Log(absl::StrCat("tls: whoever connects has to trust this server's authority once: ", base_url_,
                      "/trust, fingerprint ", identity_->root_sha256));
+  }
+  if (absl::StartsWith(config_.source, "phone:")) {
+    Log(absl::StrCat(
+        "waiting for the phone: open on it the link that `saccade invite --role wearer "
+        "--data-dir ",
+        config_.data_dir.string(), "` makes"));
   }
   Log(absl::StrCat("invites: `saccade invite --role pilot --data-dir ", config_.data_dir.string(),
                    "` makes a link"));

@@ -41,6 +41,7 @@ class FrontDoor {
   explicit FrontDoor(const ServerConfig& config) : config_(config) {}
   std::string BaseUrl(int http_port) const;
   void SayInvites();
+  const char* WearerPath() const;  // of the page that is theirs
 
   const ServerConfig config_;
   std::optional<ServerIdentity> identity_;

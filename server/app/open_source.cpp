@@ -18,6 +18,16 @@ absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config) {
                 sim = source->get();
                 return *std::move(source);
               });
+  PhoneSource* phone = nullptr;
+  sources.Add("phone",
+              [&](absl::string_view rest,
+                  const SourceOptions& options) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
+                absl::StatusOr<std::unique_ptr<PhoneSource>> source =
+                    PhoneSource::Open(rest, options);
+                if (!source.ok()) return source.status();
+                phone = source->get();
+                return *std::move(source);
+              });
   SourceOptions options;
   options.realtime = !config.every_frame;
   options.camera_file = config.camera_file;
@@ -31,7 +41,7 @@ absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config) {
   if (sim != nullptr && !config.sim_truth.empty()) {
     if (absl::Status truth = sim->WriteTruthTo(config.sim_truth); !truth.ok()) return truth;
   }
-  return OpenedSource{*std::move(source), *std::move(mount)};
+  return OpenedSource{*std::move(source), *std::move(mount), phone};
 }
 
 }  // namespace saccade

@@ -6,6 +6,7 @@
 
 #include "server/app/server_config.hpp"
 #include "server/capture/frame_source.hpp"
+#include "server/capture/phone/phone_source.hpp"
 #include "server/mount/mount_registry.hpp"
 
 namespace saccade {
@@ -14,6 +15,7 @@ namespace saccade {
 struct OpenedSource {
   std::unique_ptr<FrameSource> source;
   OpenedMount mount;
+  PhoneSource* phone = nullptr;  // the source, where that is a phone
 };
 
 /// The source and the mount that the configuration names, of every scheme this program links.

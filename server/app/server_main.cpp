@@ -20,6 +20,7 @@
 #include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
+#include "server/rpc/wearer_entrance.hpp"
 #include "server/store/annotation_store.hpp"
 #include "server/tracker/tracker.hpp"
 #include "shared/io/log.hpp"
@@ -53,12 +54,13 @@ absl::Status CheckVideo(const ServerConfig& config, const OpenedSource& opened) 
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, StreamHub& hub,
-                                                   Shutdown& shutdown) {
+absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, EventSink& sink,
+                                                   PhoneSource*& phone, Shutdown& shutdown) {
   shutdown.SetPhase("opening the source");
   absl::StatusOr<OpenedSource> opened = OpenConfiguredSource(config);
   if (!opened.ok()) return opened.status();
   if (absl::Status video = CheckVideo(config, *opened); !video.ok()) return video;
+  phone = opened->phone;
   SourceInfo info = opened->source->info();
   if (opened->mount.mount && !opened->mount.crop)
     info.mount = std::make_shared<const MountModel>(opened->mount.mount->model());
@@ -87,7 +89,7 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, S
   options.every_frame = config.every_frame;
   options.video_bit_rate_bit_s = config.video_bit_rate_bit_s;
   return Engine::Create(std::move(options), std::move(opened->source), *std::move(tracker),
-                        *std::move(store), hub);
+                        *std::move(store), sink);
 }
 
 void SayReady(const ServerConfig& config, int grpc_port, int http_port) {
@@ -123,7 +125,9 @@ void SayProblem(const absl::Status& problem) {
 absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   RaiseDescriptorLimit();
   StreamHub hub;
-  absl::StatusOr<std::unique_ptr<Engine>> engine = MakeEngine(config, hub, shutdown);
+  WearerTee tee(hub);
+  PhoneSource* phone = nullptr;
+  absl::StatusOr<std::unique_ptr<Engine>> engine = MakeEngine(config, tee, phone, shutdown);
   if (!engine.ok()) return engine.status();
   const absl::Cleanup no_commit = [&shutdown] { shutdown.SetCommit(nullptr); };
   shutdown.SetCommit(
@@ -140,7 +144,10 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   shutdown.SetPhase("opening the ports");
   absl::StatusOr<std::unique_ptr<RpcServer>> rpc = RpcServer::Start(rpc_options, **engine, hub);
   if (!rpc.ok()) return rpc.status();
+  WearerEntrance wearer((*door)->access(), phone, config.source);
+  tee.Connect(&wearer);
   GatewayOptions gateway_options;
+  gateway_options.wearer = &wearer;
   gateway_options.host = config.http.host;
   gateway_options.port = config.http.port;
   gateway_options.web_root = WebRoot(config);

@@ -26,6 +26,21 @@ struct DecodeHeader {
   double fps = 0;                   // 0: the video does not say
 };
 
+/// What `saccade-decode --packets` reads from its standard input, one after the other: this, then
+/// `size` bytes of one coded picture.
+struct PacketHeader {
+  static constexpr std::uint32_t kMagic = 0x53434b31;
+  static constexpr std::uint32_t kMostBytes = 1 << 20;
+  enum Codec : std::uint32_t { kH264 = 1, kVp8 = 2 };
+  std::uint32_t magic = kMagic;
+  std::uint32_t codec = kH264;
+  std::uint32_t key_frame = 0;
+  std::uint32_t anew = 0;  // what came before was damaged: nothing of it is kept
+  std::uint32_t size = 0;  // bytes that follow
+  std::uint32_t unused = 0;
+  std::int64_t time_ns = 0;  // comes back with its picture
+};
+
 /// Its standard input is the file, opened by whoever starts it: it can open none itself.
 inline constexpr int kDecodeFile = 0, kDecodeOut = 1;
 

@@ -55,7 +55,8 @@ class Gateway::Impl {
                  options.read_timeout,
                  options.write_timeout,
                  {},
-                 nullptr} {
+                 nullptr,
+                 options.wearer} {
     context_.call = [this, channel = std::move(channel)](CallRequest request,
                                                          UpstreamCall::Handlers handlers) {
       // The guard keeps `Run` going until the call is over, so that its end is never lost.

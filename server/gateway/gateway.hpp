@@ -16,6 +16,8 @@ class Channel;
 
 namespace saccade {
 
+class WearerPort;
+
 /// How the gateway serves browsers.
 struct GatewayOptions {
   std::string host = "127.0.0.1";  ///< address to bind, an IP literal
@@ -37,6 +39,9 @@ struct GatewayOptions {
   std::string tls_chain_pem, tls_key_pem;
   /// Whom to trust, offered at /trust with how to; empty: nobody special.
   std::string root_pem, root_sha256;
+
+  /// Where the WebSocket /wear/upstream leads; null: nowhere. Outlives the gateway.
+  WearerPort* wearer = nullptr;
 
   /// InvalidArgument names the field and the remedy.
   absl::Status Validate() const;

@@ -15,6 +15,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "server/gateway/http_request_reader.hpp"
+#include "server/gateway/wearer_socket.hpp"
 #include "shared/io/log.hpp"
 
 namespace saccade {
@@ -24,8 +25,6 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace net = boost::asio;
 using boost::system::error_code;
-
-using TlsStream = net::ssl::stream<beast::tcp_stream&>;
 
 constexpr char kHandshakeRecord = 0x16;  // what a TLS connection begins with
 constexpr std::chrono::seconds kHandshakeTimeout(10);
@@ -45,6 +44,15 @@ constexpr absl::string_view kForwarded[] = {"authorization", "traceparent", "tra
                                             "x-request-id"};
 
 using Request = HttpRequestReader::Request;
+
+/// What a page may ask the browser's user for: the wearer's phone for its camera and its motion.
+const char* PermissionsOf(absl::string_view target) {
+  const absl::string_view path = target.substr(0, target.find_first_of("?#"));
+  return path == "/wear" || path == "/wear.html"
+             ? "camera=(self), accelerometer=(self), gyroscope=(self), screen-wake-lock=(self), "
+               "microphone=(), geolocation=()"
+             : "camera=(), microphone=(), geolocation=()";
+}
 
 absl::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -189,12 +197,21 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     if (downgraded || !HostCheck::OriginAllowed(origin, host)) {
       return Refuse(http::status::forbidden, "pages of other origins may not call this server");
     }
+    if (context_.wearer != nullptr && IsWearerUpgrade(request)) return BecomeWearerSocket();
     const auto format = GrpcWebFormatOf(View(request[http::field::content_type]));
     if (request.method() == http::verb::post && format) return Forward(*format);
     if (request.method() == http::verb::get || request.method() == http::verb::head) {
       return ServeFile();
     }
     Refuse(http::status::method_not_allowed, "GET a file, or POST gRPC-Web");
+  }
+
+  void BecomeWearerSocket() {
+    // Nobody has anything to say before our answer.
+    if (buffer_.size() > 0) return RefuseAndClose(http::status::bad_request, "too early");
+    StartWearerSocket({tcp_, tls_ ? &*tls_ : nullptr, reader_->request(), peer_, shared_from_this(),
+                       [this] { Close(); }},
+                      *context_.wearer);
   }
 
   // --- Files ------------------------------------------------------------------------------------
@@ -224,7 +241,7 @@ class Connection final : public HttpConnection, public std::enable_shared_from_t
     response->set(http::field::etag, file->etag);
     response->set(http::field::vary, "Accept-Encoding");
     response->set("Content-Security-Policy", kContentSecurityPolicy);
-    response->set("Permissions-Policy", "camera=(), microphone=(), geolocation=()");
+    response->set("Permissions-Policy", PermissionsOf(View(request.target())));
     if (zip) response->set(http::field::content_encoding, "gzip");
     if (!same) response->content_length(body.size());
     if (!same && request.method() == http::verb::get) {

@@ -12,6 +12,7 @@
 #include "server/gateway/host_check.hpp"
 #include "server/gateway/static_files.hpp"
 #include "server/gateway/upstream_call.hpp"
+#include "server/pipeline/wearer_port.hpp"
 
 namespace saccade {
 
@@ -25,6 +26,7 @@ struct HttpContext {
   /// Starts a call to the gRPC server.
   std::function<std::shared_ptr<UpstreamCall>(CallRequest, UpstreamCall::Handlers)> call;
   boost::asio::ssl::context* tls = nullptr;  // null: plain
+  WearerPort* wearer = nullptr;              // null: no phone can be the camera
 };
 
 /// One browser connection: requests one after the other, on the gateway's thread.

@@ -53,6 +53,7 @@ constexpr auto kTable = std::to_array<RoleRow>({
     // above.
     {"GET /", kAnyone},
     {"GET /trust", kAnyone},
+    {"GET /wear/upstream", kWearer},  // the phone that is the camera
 });
 
 }  // namespace

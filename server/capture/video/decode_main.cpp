@@ -10,6 +10,8 @@
 #include <string>
 
 #include "server/capture/video/decoder.hpp"
+#include "server/capture/video/packet_loop.hpp"
+#include "server/capture/video/picture_writer.hpp"
 #include "server/capture/video/sandbox.hpp"
 #include "shared/version/version.hpp"
 
@@ -18,9 +20,10 @@ namespace {
 
 constexpr char kHelp[] =
     "usage: saccade-decode [--after NS] < VIDEO | saccade-decode --url rtsp://HOST[:PORT]/PATH\n"
+    "       saccade-decode --packets < PACKETS\n"
     "       saccade-decode --try-sandbox [--network] | --version\n"
     "Decodes a video and writes its pictures to standard output, in a form of its own.\n"
-    "saccade-server starts it for file: and rtsp: sources.\n";
+    "saccade-server starts it for file:, rtsp: and phone: sources.\n";
 
 /// The host by its number: in the sandbox no file can be opened, and names are looked up in files.
 std::string WithAddress(const std::string& url) {
@@ -48,7 +51,7 @@ std::string WithAddress(const std::string& url) {
 
 int Main(int argc, char** argv) {
   DecodeRequest request;
-  bool attempt = false, network = false;
+  bool attempt = false, network = false, packets = false;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     const bool has_value = i + 1 < argc;
@@ -58,6 +61,8 @@ int Main(int argc, char** argv) {
       request.url = argv[++i];
     } else if (word == "--try-sandbox") {
       attempt = true;
+    } else if (word == "--packets") {
+      packets = true;
     } else if (word == "--network") {
       network = true;
     } else if (word == "--version") {
@@ -75,7 +80,7 @@ int Main(int argc, char** argv) {
     const std::string tried = TrySandbox();
     return write(1, tried.data(), tried.size()) < 0 ? 1 : 0;
   }
-  if (problem.empty()) return DecodeVideo(request);
+  if (problem.empty()) return packets ? DecodePackets() : DecodeVideo(request);
   WriteError("the decoder's sandbox cannot be had: " + problem);
   return 1;
 }

@@ -4,9 +4,6 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/display.h>
-#include <libavutil/imgutils.h>
-#include <libavutil/pixdesc.h>
-#include <libswscale/swscale.h>
 }
 #include <unistd.h>
 
@@ -14,49 +11,20 @@ extern "C" {
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <vector>
 
 #include "server/capture/decode_protocol.hpp"
+#include "server/capture/video/picture_writer.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr int kReadBytes = 1 << 16;
-constexpr int kMostSide_px = 8192;
 constexpr int kAliveEvery = 10;  // frames that are skipped
 constexpr AVRational kNanoseconds{1, 1'000'000'000};
 // Containers of pictures; none that names other files (playlists, concatenations).
 constexpr char kFormats[] =
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,h264,hevc,ivf,ogg,flv,mjpeg,asf,rtsp,"
     "rtp,sdp";
-
-/// False: nobody reads any more.
-bool WriteAll(const void* data, std::size_t size) {
-  const char* at = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t written = write(kDecodeOut, at, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    at += written;
-    size -= static_cast<std::size_t>(written);
-  }
-  return true;
-}
-
-bool Send(DecodeHeader header, const void* data = nullptr, std::size_t size = 0) {
-  header.size = static_cast<std::uint32_t>(size);
-  return WriteAll(&header, sizeof header) && (size == 0 || WriteAll(data, size));
-}
-
-bool SendText(DecodeHeader header, const std::string& text) {
-  return Send(header, text.data(), text.size());
-}
-
-std::string Words(int error) {
-  char text[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(error, text, sizeof text);
-  return text;
-}
 
 /// What the file says of how the camera was held, as telephones do: a quarter turn, or none.
 std::uint32_t ClockwiseOf(const AVStream& stream) {
@@ -105,7 +73,7 @@ class Decoder {
       }
       if (read >= 0) av_packet_unref(packet);
       if (read < 0 && read != AVERROR_EOF && !request_.url.empty()) {
-        WriteError("the stream broke off: " + Words(read));
+        WriteError("the stream broke off: " + AvWords(read));
         return 1;
       }
     }
@@ -143,7 +111,7 @@ class Decoder {
     av_dict_free(&options);
     if (error < 0) return Fail(OpenWords(error));
     error = avformat_find_stream_info(format_, nullptr);
-    if (error < 0) return Fail("its streams cannot be read: " + Words(error));
+    if (error < 0) return Fail("its streams cannot be read: " + AvWords(error));
     const AVCodec* decoder = nullptr;
     const int index = av_find_best_stream(format_, AVMEDIA_TYPE_VIDEO, -1, -1, &decoder, 0);
     if (index < 0) return Fail("it holds no video that can be decoded");
@@ -153,9 +121,9 @@ class Decoder {
 
   std::string OpenWords(int error) const {
     if (!request_.url.empty()) {
-      return "it cannot be opened (" + Words(error) + "); is it on, and is the address right?";
+      return "it cannot be opened (" + AvWords(error) + "); is it on, and is the address right?";
     }
-    return "it is no video that is read here (" + Words(error) +
+    return "it is no video that is read here (" + AvWords(error) +
            "); convert it, for example: ffmpeg -i IN -c:v libx264 -an OUT.mp4";
   }
 
@@ -165,7 +133,7 @@ class Decoder {
     codec_->thread_count = 1;  // the sandbox has no threads
     codec_->max_pixels = std::int64_t{1} << 25;
     const int error = avcodec_open2(codec_, decoder, nullptr);
-    if (error < 0) return Fail("its video cannot be decoded: " + Words(error));
+    if (error < 0) return Fail("its video cannot be decoded: " + AvWords(error));
     DecodeHeader info;
     info.kind = DecodeHeader::kInfo;
     info.width = static_cast<std::uint32_t>(codec_->width);
@@ -230,50 +198,21 @@ class Decoder {
     if (time_ns <= request_.after_ns) {
       return ++skipped_ % kAliveEvery != 0 || Send(header);
     }
-    if (frame.width > kMostSide_px || frame.height > kMostSide_px) return Fail("it is too large");
-    const auto format = static_cast<AVPixelFormat>(frame.format);
-    const AVPixFmtDescriptor* described = av_pix_fmt_desc_get(format);
-    const bool grey = described != nullptr && described->nb_components == 1;
-    const AVPixelFormat wanted = grey ? AV_PIX_FMT_GRAY8 : AV_PIX_FMT_BGR24;
-    scaler_ =
-        sws_getCachedContext(scaler_, frame.width, frame.height, format, frame.width, frame.height,
-                             wanted, SWS_BICUBIC | SWS_ACCURATE_RND, nullptr, nullptr, nullptr);
-    if (scaler_ == nullptr) return Fail("its pixel format is not read");
-    const int* source = sws_getCoefficients(frame.colorspace);
-    sws_setColorspaceDetails(scaler_, source, frame.color_range == AVCOL_RANGE_JPEG,
-                             sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, 1 << 16, 1 << 16);
-    header.kind = DecodeHeader::kFrame;
-    header.width = static_cast<std::uint32_t>(frame.width);
-    header.height = static_cast<std::uint32_t>(frame.height);
-    header.channels = grey ? 1 : 3;
     header.time_ns = time_ns;
     header.bad = bad_;
-    const std::size_t line = static_cast<std::size_t>(header.width) * header.channels;
-    // Vectors of swscale write some bytes beyond the last line.
-    pixels_.resize(line * header.height + 64);
-    std::uint8_t* planes[] = {pixels_.data()};
-    const int strides[] = {static_cast<int>(line)};
-    sws_scale(scaler_, frame.data, frame.linesize, 0, frame.height, planes, strides);
-    return Send(header, pixels_.data(), line * header.height);
+    return writer_.SendFrame(frame, header);
   }
 
   const DecodeRequest request_;
   AVFormatContext* format_ = nullptr;
   AVStream* stream_ = nullptr;
   AVCodecContext* codec_ = nullptr;
-  SwsContext* scaler_ = nullptr;
-  std::vector<std::uint8_t> pixels_;
+  PictureWriter writer_;
   std::int64_t last_ns_ = -1, frame_ns_ = 0;
   std::uint64_t bad_ = 0, skipped_ = 0;
 };
 
 }  // namespace
-
-void WriteError(const std::string& text) {
-  DecodeHeader header;
-  header.kind = DecodeHeader::kError;
-  (void)SendText(header, text);
-}
 
 int DecodeVideo(const DecodeRequest& request) {
   // Ends with the process: nothing is worth freeing.

@@ -15,7 +15,4 @@ struct DecodeRequest {
 /// within the sandbox. Returns the exit code.
 int DecodeVideo(const DecodeRequest& request);
 
-/// One kError message.
-void WriteError(const std::string& text);
-
 }  // namespace saccade

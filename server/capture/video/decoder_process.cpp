@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -81,7 +82,52 @@ int Spawn(const std::filesystem::path& program, const std::vector<std::string>& 
   return error;
 }
 
+struct Spawned {
+  pid_t pid = -1;
+  int pipe = -1;  // what it writes
+};
+
+/// saccade-decode with `file` (-1: nothing) as its standard input.
+absl::StatusOr<Spawned> SpawnDecoder(const std::vector<std::string>& words, int file) {
+  const std::filesystem::path program = DecoderProgram();
+  int ends[2] = {-1, -1};
+  Spawned spawned;
+  int error = pipe2(ends, O_CLOEXEC) == 0 ? 0 : errno;
+  if (error == 0) {
+    (void)fcntl(ends[1], F_SETPIPE_SZ, kPipeBytes);
+    error = Spawn(program, words, file, ends[1], &spawned.pid);
+    close(ends[1]);
+    if (error != 0) close(ends[0]);
+  }
+  spawned.pipe = ends[0];
+  if (error == 0) return spawned;
+  const std::string text =
+      absl::StrCat(program.string(), ": cannot be started (", std::strerror(error), ")");
+  if (error == ENOENT) {
+    return absl::NotFoundError(
+        absl::StrCat(text, "; videos are decoded by it: install it beside this program"));
+  }
+  return absl::ResourceExhaustedError(text);
+}
+
 }  // namespace
+
+absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::StartPackets() {
+  int ends[2] = {-1, -1};
+  // Not a pipe: to write to one that nobody reads any more is a signal.
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("saccade-decode: no socket to it (", std::strerror(errno), ")"));
+  }
+  const absl::StatusOr<Spawned> spawned = SpawnDecoder({"saccade-decode", "--packets"}, ends[1]);
+  close(ends[1]);
+  if (spawned.ok()) {
+    return std::unique_ptr<DecoderProcess>(
+        new DecoderProcess(spawned->pid, spawned->pipe, ends[0]));
+  }
+  close(ends[0]);
+  return spawned.status();
+}
 
 absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::Start(const VideoInput& input,
                                                                       std::int64_t after_ns) {
@@ -93,25 +139,10 @@ absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::Start(const Vide
   }
   std::vector<std::string> words = {"saccade-decode", "--after", absl::StrCat(after_ns)};
   if (file < 0) words.insert(words.end(), {"--url", input.url});
-  const std::filesystem::path program = DecoderProgram();
-  int ends[2] = {-1, -1};
-  pid_t pid = -1;
-  int error = pipe2(ends, O_CLOEXEC) == 0 ? 0 : errno;
-  if (error == 0) {
-    (void)fcntl(ends[1], F_SETPIPE_SZ, kPipeBytes);
-    error = Spawn(program, words, file, ends[1], &pid);
-    close(ends[1]);
-    if (error != 0) close(ends[0]);
-  }
+  const absl::StatusOr<Spawned> spawned = SpawnDecoder(words, file);
   if (file >= 0) close(file);
-  if (error == 0) return std::unique_ptr<DecoderProcess>(new DecoderProcess(pid, ends[0]));
-  const std::string text =
-      absl::StrCat(program.string(), ": cannot be started (", std::strerror(error), ")");
-  if (error == ENOENT) {
-    return absl::NotFoundError(
-        absl::StrCat(text, "; videos are decoded by it: install it beside this program"));
-  }
-  return absl::ResourceExhaustedError(text);
+  if (!spawned.ok()) return spawned.status();
+  return std::unique_ptr<DecoderProcess>(new DecoderProcess(spawned->pid, spawned->pipe, -1));
 }
 
 DecoderProcess::~DecoderProcess() {
@@ -120,6 +151,7 @@ DecoderProcess::~DecoderProcess() {
     waitpid(pid_, nullptr, 0);
   }
   close(pipe_);
+  if (input_ >= 0) close(input_);
 }
 
 absl::Status DecoderProcess::Death() {
@@ -165,6 +197,30 @@ absl::Status DecoderProcess::Read(void* out, std::size_t size, const std::functi
     if (got <= 0) return Death();
     at += got;
     size -= static_cast<std::size_t>(got);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DecoderProcess::Write(const void* data, std::size_t size,
+                                   const std::function<bool()>& stopped,
+                                   std::chrono::milliseconds most) {
+  const char* at = static_cast<const char*>(data);
+  const auto end = std::chrono::steady_clock::now() + most;
+  while (size > 0) {
+    pollfd wait_for{input_, POLLOUT, 0};
+    const int ready = poll(&wait_for, 1, kLookForStop_ms);
+    if (stopped()) return absl::CancelledError("");
+    if (ready <= 0) {
+      if (std::chrono::steady_clock::now() > end) {
+        return absl::DeadlineExceededError("the decoder takes nothing for too long");
+      }
+      continue;
+    }
+    const ssize_t sent = send(input_, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (sent <= 0) return Death();
+    at += sent;
+    size -= static_cast<std::size_t>(sent);
   }
   return absl::OkStatus();
 }

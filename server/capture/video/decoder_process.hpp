@@ -31,6 +31,8 @@ class DecoderProcess {
   ///   ResourceExhausted   no descriptor or no process is to be had
   static absl::StatusOr<std::unique_ptr<DecoderProcess>> Start(const VideoInput& input,
                                                                std::int64_t after_ns);
+  /// One that decodes what Write() gives it, packet by packet (PacketHeader).
+  static absl::StatusOr<std::unique_ptr<DecoderProcess>> StartPackets();
   ~DecoderProcess();
 
   pid_t pid() const { return pid_; }
@@ -41,19 +43,23 @@ class DecoderProcess {
   ///   Unavailable       it has died by itself, or writes nonsense: says how
   absl::StatusOr<DecodeHeader> ReadHeader(const std::function<bool()>& stopped,
                                           std::chrono::milliseconds most);
+  /// Errors as ReadHeader.
+  absl::Status Write(const void* data, std::size_t size, const std::function<bool()>& stopped,
+                     std::chrono::milliseconds most);
   absl::Status ReadBytes(void* out, std::size_t size, const std::function<bool()>& stopped);
   /// The text of a kInfo or kError, fit for a log.
   absl::StatusOr<std::string> ReadText(const DecodeHeader& header,
                                        const std::function<bool()>& stopped);
 
  private:
-  DecoderProcess(pid_t pid, int pipe) : pid_(pid), pipe_(pipe) {}
+  DecoderProcess(pid_t pid, int pipe, int input) : pid_(pid), pipe_(pipe), input_(input) {}
   absl::Status Read(void* out, std::size_t size, const std::function<bool()>& stopped,
                     std::chrono::milliseconds most);
   absl::Status Death();
 
   const pid_t pid_;
   const int pipe_;
+  const int input_;  // -1: its input is the file
   bool reaped_ = false;
 };
 

@@ -15,6 +15,7 @@
 #include "saccade/v1/gaze.pb.h"
 #include "saccade/v1/map.pb.h"
 #include "saccade/v1/session.pb.h"
+#include "saccade/v1/wearer.pb.h"
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
 
@@ -75,7 +76,7 @@ std::vector<const MethodDescriptor*> EveryMethod() {
   for (const auto* linked :
        {v1::GetAccessRequest::descriptor(), v1::JoinRequest::descriptor(),
         v1::ListAnnotationsRequest::descriptor(), v1::GetMapRequest::descriptor(),
-        v1::GetGazeStateRequest::descriptor()}) {
+        v1::GetGazeStateRequest::descriptor(), v1::WearerHello::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

@@ -1,6 +1,6 @@
 import type { AccessUnit } from '../gen/saccade/v1/video_pb';
 import { VideoView } from '../gen/saccade/v1/video_pb';
-import type { Event, JoinResponse } from '../gen/saccade/v1/session_pb';
+import type { Event, JoinResponse, Topic } from '../gen/saccade/v1/session_pb';
 import type { Clients } from '../transport/clients';
 import { Backoff } from '../transport/backoff';
 import { isRefusal, isReplaced, streamEndWords } from '../transport/errors';
@@ -34,6 +34,7 @@ export interface SessionOptions {
   readonly role: Role;
   readonly view: View;
   readonly name: string;
+  readonly topics?: Topic[]; // absent: all
   /** Where the session is kept for a reload; without it, only while the page lives. */
   readonly kept?: KeptSession;
   /** The other tabs of this browser, where they can be asked. */
@@ -54,6 +55,7 @@ export class Session {
   link: Link = { kind: 'connecting' };
   joined: JoinResponse | undefined;
   pose: Pose | undefined;
+  poseMs = 0; // when that came, this page's clock
   sourceEnded = false;
   participants: readonly Participant[] = [];
   statistics: Statistics | undefined;
@@ -178,7 +180,7 @@ export class Session {
 
   private async runOnce(attempt: AbortController): Promise<void> {
     const { signal } = attempt;
-    const { view } = this.options;
+    const { view, topics = [] } = this.options;
     await this.options.enter?.(signal);
     const joined = await this.joining.join(
       signal,
@@ -197,6 +199,7 @@ export class Session {
         {
           sessionId: joined.sessionId,
           window: WINDOW,
+          topics,
           videoView: view === 'raw' ? VideoView.RAW : VideoView.AUGMENTED,
         },
         { signal },
@@ -288,6 +291,7 @@ export class Session {
   private receivePose(pose: Pose): void {
     if (this.pose && pose.mapRevision !== this.pose.mapRevision) this.path.length = 0;
     this.pose = pose;
+    this.poseMs = this.lastEventMs;
     if (!isPlaced(pose)) return;
     this.path.push(pose);
     if (this.path.length > 9000) this.path.splice(0, 3000);

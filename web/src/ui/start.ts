@@ -16,7 +16,7 @@ interface Page {
 
 /** Joins the server that this page came from, and shows what it tells until the page is left. */
 export function startPage(
-  options: Pick<SessionOptions, 'role' | 'view' | 'name'>,
+  options: Pick<SessionOptions, 'role' | 'view' | 'name' | 'topics'>,
   makePage: (session: Session, player: Player, token: () => string) => Page,
 ): void {
   const access = new Access(location.origin, takeInvite(), tabStorage(), storage());

@@ -71,8 +71,8 @@ export class WearerApp {
 
   private update(): void {
     const { session, player, paused } = this;
-    const { link, pose, sourceEnded } = session;
-    const words = statusWords({ link, pose, sourceEnded, nowMs: pageNowMs() });
+    const { link, pose, poseMs, sourceEnded } = session;
+    const words = statusWords({ link, pose, poseMs, sourceEnded, nowMs: pageNowMs() });
     const text = [words.text, words.advice].filter(Boolean).join(': ');
     const age = player.shown ? pageNowMs() - player.shown.drawnMs : 0;
     const stale = age > STALE_MS && !paused && !sourceEnded;

@@ -23,9 +23,13 @@ export interface StatusInput {
   readonly pose: Pose | undefined;
   readonly sourceEnded: boolean;
   readonly nowMs: number;
+  readonly poseMs?: number; // when the pose came; absent: just now
 }
 
-export function statusWords({ link, pose, sourceEnded, nowMs }: StatusInput): StatusWords {
+const NO_PICTURE_MS = 2000;
+
+export function statusWords(input: StatusInput): StatusWords {
+  const { link, pose, sourceEnded, nowMs, poseMs = nowMs } = input;
   switch (link.kind) {
     case 'connecting':
       return { mark: '◌', text: 'connecting', advice: '', warn: false };
@@ -46,6 +50,14 @@ export function statusWords({ link, pose, sourceEnded, nowMs }: StatusInput): St
       text: 'recording ended',
       advice: 'the last picture and map stay',
       warn: false,
+    };
+  }
+  if (pose && nowMs - poseMs > NO_PICTURE_MS) {
+    return {
+      mark: '○',
+      text: `no picture for ${spanWords(nowMs - poseMs)}`,
+      advice: 'the camera sends none: a phone may be away, or without network',
+      warn: true,
     };
   }
   return trackingWords(pose);

@@ -33,14 +33,26 @@ function withoutPriority(executablePath, folder, prefix) {
 }
 
 export class Expert {
-  /** `home`: whose certificates count; `prefix`: a command that runs the browser elsewhere. */
-  static async open(executablePath, url, { home = process.env['HOME'], prefix = [] } = {}) {
+  /**
+   * `home`: whose certificates count; `prefix`: a command that runs the browser elsewhere; `flags`: more of
+   * the browser's; `viewport`: of the page.
+   */
+  static async open(
+    executablePath,
+    url,
+    {
+      home = process.env['HOME'],
+      prefix = [],
+      flags = [],
+      viewport = { width: 1280, height: 720 },
+    } = {},
+  ) {
     const profile = mkdtempSync(join(tmpdir(), 'saccade-browser-'));
     const context = await chromium.launchPersistentContext(profile, {
       executablePath: withoutPriority(executablePath, profile, prefix),
-      args: FLAGS,
+      args: [...FLAGS, ...flags],
       env: { ...process.env, HOME: home },
-      viewport: { width: 1280, height: 720 },
+      viewport,
     });
     const page = context.pages()[0] ?? (await context.newPage());
     const expert = new Expert(context, page, profile);

@@ -110,7 +110,7 @@ async function checkLinks(context) {
 }
 
 /** As a person does in the browser's settings. */
-function trust({ saccade, folder }, home) {
+export function trust({ saccade, folder }, home) {
   const store = join(home, '.pki/nssdb');
   mkdirSync(store, { recursive: true });
   const root = join(folder, 'root.pem');

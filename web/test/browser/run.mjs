@@ -1,9 +1,9 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze|dots|person|invite|layout]   (gaze: the turning of the head; dots: measured features
+//        [--part page|gaze|dots|person|invite|layout|wear]   (gaze: the turning of the head; dots: measured features
 //        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
-//        from another address than loopback where this may make a network namespace; layout: sizes of window
-//        and barriers; page: everything else)
+//        from another address than loopback where this may make a network namespace; wear: a phone as the
+//        camera, and an expert, each in a network of its own; layout: sizes of window and barriers; page: everything else)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -43,6 +43,7 @@ const PARTS = {
   person: async () => (await import('./person.mjs')).runPerson,
   invite: async () => (await import('./invite.mjs')).runInvite,
   layout: async () => (await import('./layout.mjs')).runLayout,
+  wear: async () => (await import('./wear.mjs')).runWear,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);
 const runChecks = await PARTS[options.part]();

@@ -27,6 +27,7 @@ export async function startServer(binary, args, prefix = []) {
   return {
     http: `http://${ready.http}`,
     address: ready.http,
+    grpc: ready.grpc,
     /** Ends it as a person would, then by force; returns how long it took [ms]. */
     async stop() {
       const begin = performance.now();

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+#include <sys/types.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "server/capture/phone/coded_picture.hpp"
+#include "server/capture/video/decoder_process.hpp"
+
+namespace saccade {
+
+/// What came of one packet.
+struct DecodedPacket {
+  std::uint64_t picture_id = 0;
+  cv::Mat pixels;        // CV_8UC3 BGR or CV_8UC1; empty: none came of it
+  bool damaged = false;  // what follows is of no use before the next key frame
+};
+
+/// Coded pictures to pictures, one out for one in, by a saccade-decode of its own: the bytes come
+/// from outside. One thread, but for decoder_pid().
+class PacketDecoder {
+ public:
+  explicit PacketDecoder(std::function<bool()> stopped) : stopped_(std::move(stopped)) {}
+
+  /// `anew`: forget what came before. After an error the next one is decoded by a new process, from
+  /// its key frame on:
+  ///   Cancelled    stopped
+  ///   Unavailable  the decoder died, or hung; others as DecoderProcess
+  absl::StatusOr<DecodedPacket> Decode(const CodedPicture& packet, bool anew);
+
+  pid_t decoder_pid() const { return pid_; }
+  std::uint64_t restarts() const { return restarts_; }
+
+ private:
+  absl::Status Ask(const CodedPicture& packet, bool anew, std::chrono::milliseconds most);
+  absl::StatusOr<DecodedPacket> Answer(const CodedPicture& packet, std::chrono::milliseconds most);
+
+  const std::function<bool()> stopped_;
+  std::unique_ptr<DecoderProcess> process_;  // null: to be started
+  std::atomic<pid_t> pid_ = 0;
+  std::atomic<std::uint64_t> restarts_ = 0;
+  bool started_ = false;
+  std::uint64_t bad_of_process_ = 0;
+};
+
+}  // namespace saccade
