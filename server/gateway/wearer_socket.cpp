@@ -25,7 +25,7 @@ using boost::system::error_code;
 using Clock = std::chrono::steady_clock;
 
 constexpr char kPath[] = "/wear/upstream";
-constexpr std::chrono::milliseconds kTick(250);
+constexpr std::chrono::milliseconds kTick(100);
 constexpr std::chrono::milliseconds kEnding(500);  // for the last words to go out
 constexpr std::chrono::seconds kHandshake(5), kSilence(8);
 constexpr std::size_t kMostWaiting = 64;  // messages that the phone has not taken

@@ -30,7 +30,7 @@ class WearerPort {
     /// How long the next message may be [bytes]; asked before it is read.
     virtual std::size_t most_bytes() const = 0;
     virtual void OnMessage(absl::string_view message) = 0;
-    /// Four times a second.
+    /// Ten times a second.
     virtual void OnTick() = 0;
   };
 

@@ -141,6 +141,8 @@ export class WearApp {
   /** The picture with the marks that belong to it; without a pose, without. */
   private show(sent: Sent, pose: Pose | undefined): void {
     const rect = this.screen.show(sent.picture);
+    // Hidden as well as cleared: in Chromium on a software GPU what was cleared stayed on the screen.
+    this.painter.canvas.style.visibility = isPlaced(pose) ? '' : 'hidden';
     const { clientWidth, clientHeight } = this.element;
     this.painter.begin({ width: clientWidth, height: clientHeight }, rect);
     this.painter.clip(sent.size.width, sent.size.height);

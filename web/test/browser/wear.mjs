@@ -359,19 +359,9 @@ async function cut(context) {
   await shot(context, expert, 'cut-expert');
   const drawn = await phone.page.evaluate(() => {
     const canvas = document.querySelector('canvas.marks');
-    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-    const pixels = data.filter((value, i) => i % 4 === 3 && value > 0).length;
-    return {
-      pixels,
-      of: canvas.dataset.frameId,
-      line: document.querySelector('.line').textContent,
-    };
+    return `${canvas.style.visibility}, of frame '${canvas.dataset.frameId}'`;
   });
-  check(
-    'a picture whose pose is not known has no marks',
-    drawn.pixels === 0,
-    JSON.stringify(drawn),
-  );
+  check('a picture whose pose is not known has no marks', drawn === "hidden, of frame ''", drawn);
   const during = await phone.page.locator('.line').innerText();
   const expertDuring = (await expert.page.locator('header .status').innerText()).replace(
     /\n/g,
