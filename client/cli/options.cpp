@@ -171,6 +171,8 @@ Command CommandOf(const CLI::App& app) {
       {"invites", Command::kInvites},
       {"revoke", Command::kRevoke},
       {"audit", Command::kAudit},
+      {"waiting", Command::kWaiting},
+      {"admit", Command::kAdmit},
       {"cameras", Command::kCameras},
       {"record", Command::kRecord}};
   const CLI::App* chosen = app.get_subcommands().front();

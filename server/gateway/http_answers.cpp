@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <boost/asio/buffer.hpp>
 
 #include "absl/strings/match.h"
@@ -72,6 +73,18 @@ void BrowserConnection::RefuseTooLarge() {
   if (!format) return Refuse(http::status::payload_too_large, "request too large");
   Fail(*format, kResourceExhausted,
        absl::StrCat("request: larger than ", context_.max_request_bytes, " bytes"));
+}
+
+// What was read whole leaves the connection to the next request, which may be another's.
+void BrowserConnection::RefuseTooMuch(const GatewayRefusal& refusal) {
+  const Request& request = reader_->request();
+  keep_alive_ = !idle_since_.has_value() && request.keep_alive();
+  idle_since_.reset();
+  const auto seconds = std::chrono::ceil<std::chrono::seconds>(refusal.retry_after);
+  retry_after_s_ = absl::StrCat(std::max<std::int64_t>(1, seconds.count()));
+  const auto format = GrpcWebFormatOf(View(request[http::field::content_type]));
+  if (!format) return Refuse(http::status::too_many_requests, refusal.message);
+  Fail(*format, refusal.code, refusal.message, refusal.details);
 }
 
 void BrowserConnection::OnAnswered(error_code error) {

@@ -37,7 +37,7 @@ void BrowserConnection::Forward(GrpcWebFormat format) {
     }
     call.metadata.emplace_back(name, View(it->value()));
   }
-  call.metadata.emplace_back(kPeerMetadata, peer_);
+  call.metadata.emplace_back(kPeerMetadata, caller_);
   call.timeout = ParseGrpcTimeout(View(request["grpc-timeout"]));
   BeginAnswer(format);
   WatchForDisconnect();
@@ -47,9 +47,10 @@ void BrowserConnection::Forward(GrpcWebFormat format) {
        [self = shared_from_this()](CallResult result) { self->OnDone(result); }});
 }
 
-void BrowserConnection::Fail(GrpcWebFormat format, int code, absl::string_view reason) {
+void BrowserConnection::Fail(GrpcWebFormat format, int code, absl::string_view reason,
+                             const std::string& details) {
   BeginAnswer(format);
-  OnDone({code, std::string(reason), {}, {}});
+  OnDone({code, std::string(reason), details, {}});
 }
 
 void BrowserConnection::BeginAnswer(GrpcWebFormat format) {

@@ -5,6 +5,7 @@
 
 #include "absl/strings/match.h"
 #include "server/gateway/http_connection_impl.hpp"
+#include "server/pipeline/peer_address.hpp"
 
 namespace saccade {
 namespace {
@@ -18,6 +19,7 @@ constexpr char kHandshakeRecord = 0x16;  // what a TLS connection begins with
 constexpr std::chrono::seconds kHandshakeTimeout(10);
 constexpr std::size_t kMaxHeadBytes = 16 * 1024;
 constexpr std::size_t kReadBytes = 16 * 1024;
+constexpr std::size_t kHeadBytes = 500;  // about what a browser's head is
 
 }  // namespace
 
@@ -40,6 +42,8 @@ std::optional<std::chrono::steady_clock::time_point> BrowserConnection::idle_sin
 
 void BrowserConnection::ReadRequest() {
   reader_.emplace(kMaxHeadBytes, context_.max_request_bytes);
+  admitted_ = false;
+  retry_after_s_.clear();
   idle_since_ = std::chrono::steady_clock::now();
   tcp_.expires_after(context_.read_timeout);  // for the whole request
   TakeRequest();
@@ -59,9 +63,12 @@ void BrowserConnection::ReadMore() {
 void BrowserConnection::TakeRequest() {
   switch (reader_->Take(buffer_)) {
     case HttpRequestReader::Result::kNeedMore:
+      if (reader_->head_done() && !Admitted()) return;
       return ReadMore();
     case HttpRequestReader::Result::kDone:
       idle_since_.reset();
+      heard_ = true;
+      if (!Admitted()) return;
       return OnRequest();
     case HttpRequestReader::Result::kBodyTooLarge:
       return RefuseTooLarge();
@@ -72,6 +79,24 @@ void BrowserConnection::TakeRequest() {
     case HttpRequestReader::Result::kMalformed:
       return RefuseAndClose(http::status::bad_request, "not HTTP/1.1");
   }
+}
+
+// Before the body is read. A proxy's connection carries many people's requests.
+bool BrowserConnection::Admitted() {
+  if (std::exchange(admitted_, true)) return true;
+  const Request& request = reader_->request();
+  caller_ = peer_;
+  if (!context_.trusted_proxy.empty() && peer_ == context_.trusted_proxy) {
+    std::string told = ForwardedFor(View(request["X-Forwarded-For"]));
+    if (!told.empty()) caller_ = std::move(told);
+  }
+  if (!context_.admit) return true;
+  const std::optional<GatewayRefusal> refusal =
+      context_.admit(caller_, View(request[http::field::authorization]),
+                     kHeadBytes + reader_->announced_body_bytes());
+  if (!refusal) return true;
+  RefuseTooMuch(*refusal);
+  return false;
 }
 
 void BrowserConnection::OnRequest() {
@@ -117,7 +142,8 @@ void BrowserConnection::Greet() {
     plain_at_tls_ = true;
     return ReadRequest();
   }
-  tls_.emplace(tcp_, *context_.tls);
+  tls_context_ = context_.tls;
+  tls_.emplace(tcp_, *tls_context_);
   tls_->async_handshake(net::ssl::stream_base::server, buffer_.data(),
                         [self = shared_from_this()](error_code error, std::size_t used) {
                           // Nobody has anything to say before our answer: what is left over is no

@@ -35,6 +35,8 @@ class BrowserConnection final : public HttpConnection,
   void Begin(std::string peer);
   void Close() override;
   std::optional<std::chrono::steady_clock::time_point> idle_since() const override;
+  bool heard() const override { return heard_; }
+  const std::string& peer() const override { return peer_; }
 
  private:
   using error_code = boost::system::error_code;
@@ -65,12 +67,14 @@ class BrowserConnection final : public HttpConnection,
   void ReadRequest();
   void ReadMore();
   void TakeRequest();
+  bool Admitted();  // false: it was answered
   void OnRequest();
 
   // --- Files ------------------------------------------------------------------------------------
   template <class Body>
   void SetCommonHeaders(boost::beast::http::response<Body>& response) {
     response.keep_alive(keep_alive_);
+    if (!retry_after_s_.empty()) response.set("Retry-After", retry_after_s_);
     response.set("X-Content-Type-Options", "nosniff");
     response.set("Referrer-Policy", "no-referrer");
     response.set("Cross-Origin-Opener-Policy", "same-origin");
@@ -81,6 +85,7 @@ class BrowserConnection final : public HttpConnection,
               const std::string& location = "");
   void RefuseAndClose(boost::beast::http::status status, absl::string_view reason);
   void RefuseTooLarge();
+  void RefuseTooMuch(const GatewayRefusal& refusal);
 
   template <class Body>
   void WriteWhole(std::shared_ptr<boost::beast::http::response<Body>> response) {
@@ -97,7 +102,8 @@ class BrowserConnection final : public HttpConnection,
 
   // --- gRPC-Web ---------------------------------------------------------------------------------
   void Forward(GrpcWebFormat format);
-  void Fail(GrpcWebFormat format, int code, absl::string_view reason);
+  void Fail(GrpcWebFormat format, int code, absl::string_view reason,
+            const std::string& details = "");
   void BeginAnswer(GrpcWebFormat format);
   void OnMessage(std::string reply);
   void OnDone(const CallResult& result);
@@ -110,13 +116,18 @@ class BrowserConnection final : public HttpConnection,
   void OnWatched(error_code error, std::size_t size);
 
   boost::beast::tcp_stream tcp_;
-  std::optional<TlsStream> tls_;  // over tcp_; nothing: plain
-  bool plain_at_tls_ = false;     // plain HTTP where TLS is spoken
+  std::shared_ptr<boost::asio::ssl::context> tls_context_;  // of when it connected
+  std::optional<TlsStream> tls_;                            // over tcp_; nothing: plain
+  bool plain_at_tls_ = false;                               // plain HTTP where TLS is spoken
   const HttpContext& context_;
   std::function<void(HttpConnection*)> on_closed_;
   boost::beast::flat_buffer buffer_;
   std::optional<HttpRequestReader> reader_;
-  std::string peer_;                                                 // address without port
+  std::string peer_;           // address without port
+  std::string caller_;         // the same, or whom the proxy tells of: of this request
+  std::string retry_after_s_;  // of the answer being made; empty: none
+  bool heard_ = false;         // a whole request came
+  bool admitted_ = false;      // this one
   std::optional<std::chrono::steady_clock::time_point> idle_since_;  // nothing is asked of us
   bool keep_alive_ = false;
   bool closed_ = false;

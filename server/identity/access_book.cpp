@@ -11,6 +11,7 @@
 
 #include "server/identity/access_ledger.hpp"
 #include "server/identity/access_rows.hpp"
+#include "server/pipeline/rate_limiter.hpp"
 #include "shared/io/log.hpp"
 
 namespace saccade {
@@ -18,6 +19,7 @@ namespace {
 
 constexpr std::size_t kMaxWaiting = 256;
 constexpr std::size_t kMaxUnwritten = 1000;  // entries of the audit
+constexpr RateLimit kKeptRefusals{0.1, 50};  // of one pass
 constexpr std::int64_t kLeastLife_s = 60, kMostLife_s = 31'536'000;
 constexpr int kMostUses = 1000;
 constexpr std::size_t kMaxLabelBytes = 60;
@@ -74,9 +76,13 @@ class AccessBook::Impl {
     entry.unix_ms = std::chrono::duration_cast<std::chrono::milliseconds>(
                         std::chrono::system_clock::now().time_since_epoch())
                         .count();
+    // Who tries the same forbidden thing over and over must not push others' deeds out.
+    const bool refused = entry.outcome != "ok";
+    const Timestamp now_ns = MonotonicNow();
     entry.invite_id = ledger_.InviteOf(entry.access_id);
     const std::lock_guard guard(mutex_);
-    if (unwritten_.size() >= kMaxUnwritten) {
+    if (unwritten_.size() >= kMaxUnwritten ||
+        (refused && refusals_.Take(entry.access_id, now_ns))) {
       ++lost_;
       return;
     }
@@ -122,13 +128,13 @@ class AccessBook::Impl {
     std::size_t lost = 0;
     {
       const std::lock_guard guard(mutex_);
+      if (unwritten_.empty()) return;  // what was lost is told with the next
       entries.swap(unwritten_);
       lost = std::exchange(lost_, 0);
     }
-    if (entries.empty()) return;
     if (lost > 0) {
-      entries.push_back(entries.back());
-      entries.back().call = absl::StrCat("and ", lost, " more that came too fast to be kept");
+      const std::string call = absl::StrCat("and ", lost, " more that came too fast to be kept");
+      entries.push_back({entries.back().unix_ms, "", "", "", "", call, ""});
     }
     const absl::Status kept = rows_->Put(entries);
     if (!kept.ok()) Log(absl::StrCat("audit: ", entries.size(), " entries lost: ", kept.message()));
@@ -154,6 +160,7 @@ class AccessBook::Impl {
   std::condition_variable_any wake_;
   std::deque<std::function<void()>> jobs_;  // guarded by mutex_, as what follows
   std::vector<AuditFacts> unwritten_;
+  RateLimiter refusals_{kKeptRefusals};
   std::size_t lost_ = 0;
   std::jthread thread_;  // last: uses everything above
 };
@@ -188,12 +195,18 @@ void AccessBook::CreateInvite(InviteDraft draft, Done<Issued> done) {
   impl_->Post([this, draft = std::move(draft), done] { done(impl_->ledger().CreateInvite(draft)); },
               done);
 }
-void AccessBook::Redeem(std::string token, Done<Issued> done) {
-  impl_->Post([this, token = std::move(token), done] { done(impl_->ledger().Redeem(token)); },
+void AccessBook::Redeem(std::string token, Done<Issued> done, std::string display_name) {
+  impl_->Post([this, token = std::move(token), name = std::move(display_name),
+               done] { done(impl_->ledger().Redeem(token, name)); },
               done);
 }
 void AccessBook::Revoke(std::string invite_id, Done<int> done) {
   impl_->Post([this, id = std::move(invite_id), done] { done(impl_->Revoke(id)); }, done);
+}
+std::vector<WaitingFacts> AccessBook::Waiting() const { return impl_->ledger().Waiting(); }
+void AccessBook::Admit(std::string id, bool refuse, Done<WaitingFacts> done) {
+  impl_->Post([this, id = std::move(id), refuse, done] { done(impl_->ledger().Admit(id, refuse)); },
+              done);
 }
 std::vector<InviteFacts> AccessBook::Invites() const { return impl_->ledger().Invites(); }
 void AccessBook::Record(AuditFacts entry) { impl_->Record(std::move(entry)); }

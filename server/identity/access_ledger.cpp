@@ -70,6 +70,7 @@ absl::StatusOr<Issued> AccessLedger::CreateInvite(const InviteDraft& draft) {
   const Token token = NewToken('i');
   InviteRow row;
   row.facts = {token.id, draft.role, draft.label, Now(), Now() + draft.life_s, draft.uses};
+  row.facts.waits = draft.waits || (options_.waiting_room && draft.role < AccessRole::kWearer);
   row.secret_sha256 = Sha256Hex(token.secret);
   {
     const std::lock_guard guard(mutex_);
@@ -84,7 +85,8 @@ absl::StatusOr<Issued> AccessLedger::CreateInvite(const InviteDraft& draft) {
   return Issued{row.facts, token.ToString()};
 }
 
-absl::StatusOr<Issued> AccessLedger::Redeem(const std::string& text) {
+absl::StatusOr<Issued> AccessLedger::Redeem(const std::string& text,
+                                            const std::string& display_name) {
   const std::optional<Token> token = ParseToken(text);
   if (!token) return Unknown();
   InviteRow row;
@@ -100,13 +102,63 @@ absl::StatusOr<Issued> AccessLedger::Redeem(const std::string& text) {
   if (row.facts.used >= row.facts.uses) return Refused("this invite has been used up");
   ++row.facts.used;
   const Token pass = NewToken('p');
-  const PassRow pass_row{pass.id, row.facts.id, Sha256Hex(pass.secret)};
+  const bool waits = row.facts.waits;
+  const PassRow pass_row{pass.id,
+                         row.facts.id,
+                         Sha256Hex(pass.secret),
+                         display_name.empty() ? "guest" : display_name,
+                         Now(),
+                         waits ? PassState::kWaiting : PassState::kIn};
   const absl::Status kept = rows_ ? rows_->Put(row, pass_row) : absl::OkStatus();
   if (!kept.ok()) return kept;
   const std::lock_guard guard(mutex_);
   invites_[row.facts.id] = row;
   passes_[pass.id] = pass_row;
-  return Issued{row.facts, pass.ToString()};
+  return Issued{row.facts, pass.ToString(), waits};
+}
+
+WaitingFacts AccessLedger::FactsOf(const PassRow& pass, const InviteFacts& invite) const {
+  return {pass.id, pass.display_name, invite.role, pass.since_unix_s, invite.id, invite.label};
+}
+
+std::vector<WaitingFacts> AccessLedger::Waiting() const {
+  std::vector<WaitingFacts> all;
+  {
+    const std::lock_guard guard(mutex_);
+    for (const auto& [id, pass] : passes_) {
+      if (pass.state != PassState::kWaiting) continue;
+      const auto invite = invites_.find(pass.invite_id);
+      if (invite == invites_.end() || !EndOf(invite->second.facts).ok()) continue;
+      all.push_back(FactsOf(pass, invite->second.facts));
+    }
+  }
+  std::sort(all.begin(), all.end(), [](const WaitingFacts& a, const WaitingFacts& b) {
+    return std::pair(a.since_unix_s, a.id) < std::pair(b.since_unix_s, b.id);
+  });
+  return all;
+}
+
+absl::StatusOr<WaitingFacts> AccessLedger::Admit(const std::string& id, bool refuse) {
+  PassRow row;
+  WaitingFacts facts;
+  {
+    const std::lock_guard guard(mutex_);
+    const auto found = passes_.find(id);
+    const auto invite =
+        found == passes_.end() ? invites_.end() : invites_.find(found->second.invite_id);
+    if (invite == invites_.end() || found->second.state != PassState::kWaiting ||
+        !EndOf(invite->second.facts).ok()) {
+      return absl::NotFoundError(
+          absl::StrCat("id: nobody called ", id.substr(0, 40), " waits (any more)"));
+    }
+    row = found->second;
+    facts = FactsOf(row, invite->second.facts);
+  }
+  row.state = refuse ? PassState::kRefused : PassState::kIn;
+  if (absl::Status kept = rows_ ? rows_->Put(row) : absl::OkStatus(); !kept.ok()) return kept;
+  const std::lock_guard guard(mutex_);
+  passes_[id] = row;
+  return facts;
 }
 
 absl::StatusOr<InviteRow> AccessLedger::Revoke(const std::string& invite_id) {
@@ -175,7 +227,11 @@ absl::StatusOr<Access> AccessLedger::CheckPass(const Token& token) const {
   if (absl::Status ended = EndOf(facts); !ended.ok()) return ended;
   // Ended is ended, also where the clock was set back since.
   if (told_.contains(token.id)) return Refused("this invite has expired");
-  return Access{token.id, facts.role, facts.expires_unix_s};
+  if (pass->second.state == PassState::kRefused) return Refused("you were not let in");
+  const bool waiting = pass->second.state == PassState::kWaiting;
+  // Whoever compares roles alone lets nobody in too early.
+  return Access{token.id, waiting ? AccessRole::kAnyone : facts.role, facts.expires_unix_s,
+                waiting};
 }
 
 }  // namespace saccade

@@ -30,7 +30,9 @@ class AccessLedger {
   // What AccessBook says of the same.
   absl::StatusOr<Access> Check(absl::string_view text) const;
   absl::StatusOr<Issued> CreateInvite(const InviteDraft& draft);
-  absl::StatusOr<Issued> Redeem(const std::string& text);
+  absl::StatusOr<Issued> Redeem(const std::string& text, const std::string& display_name);
+  std::vector<WaitingFacts> Waiting() const;
+  absl::StatusOr<WaitingFacts> Admit(const std::string& id, bool refuse);
   /// In force when it returns, and then to be kept: whom one throws out is not to wait for the
   /// disk. NotFound: no such invite.
   absl::StatusOr<InviteRow> Revoke(const std::string& invite_id);
@@ -46,6 +48,7 @@ class AccessLedger {
  private:
   std::int64_t Now() const { return options_.now_unix_s(); }
   absl::Status EndOf(const InviteFacts& invite) const;
+  WaitingFacts FactsOf(const PassRow& pass, const InviteFacts& invite) const;
   absl::StatusOr<Access> CheckPass(const Token& token) const;
 
   AccessBook::Options options_;
