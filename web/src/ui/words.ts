@@ -25,10 +25,14 @@ export interface StatusInput {
   readonly nowMs: number;
 }
 
+const WAITING_ADVICE = 'the wearer sees that you are here; this page goes on by itself';
+
 export function statusWords({ link, pose, sourceEnded, nowMs }: StatusInput): StatusWords {
   switch (link.kind) {
     case 'connecting':
       return { mark: '◌', text: 'connecting', advice: '', warn: false };
+    case 'waiting':
+      return { mark: '◌', text: 'waiting to be let in', advice: WAITING_ADVICE, warn: false };
     case 'crowded':
       return { mark: '■', text: 'too many tabs', advice: crowdedWords(link.tabs), warn: true };
     case 'refused':

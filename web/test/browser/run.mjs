@@ -1,8 +1,9 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze|dots|person|invite]   (gaze: the turning of the head; dots: measured features
+//        [--part page|gaze|dots|person|invite|waiting]   (gaze: the turning of the head; dots: measured features
 //        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
-//        from another address than loopback where this may make a network namespace; page: everything else)
+//        from another address than loopback where this may make a network namespace; waiting: who comes waits
+//        to be let in; page: everything else)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -41,6 +42,7 @@ const PARTS = {
   dots: async () => (await import('./dots.mjs')).runDots,
   person: async () => (await import('./person.mjs')).runPerson,
   invite: async () => (await import('./invite.mjs')).runInvite,
+  waiting: async () => (await import('./waiting.mjs')).runWaiting,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);
 const runChecks = await PARTS[options.part]();
