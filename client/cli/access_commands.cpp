@@ -13,6 +13,7 @@
 #include "client/cli/access_files.hpp"
 #include "client/cli/commands.hpp"
 #include "client/cli/text.hpp"
+#include "client/cli/waiting_commands.hpp"
 #include "client/net/access_client.hpp"
 #include "client/net/trust.hpp"
 #include "shared/io/qr_code.hpp"
@@ -51,14 +52,6 @@ CLI::Validator Life() {
       "TIME");
 }
 
-std::string TimeText(std::int64_t unix_s) {
-  const std::time_t time = unix_s;
-  std::tm parts{};
-  localtime_r(&time, &parts);
-  char text[32];
-  return std::string(text, std::strftime(text, sizeof(text), "%Y-%m-%d %H:%M", &parts));
-}
-
 std::string StateOf(const net::Invite& invite) {
   if (invite.revoked) return "revoked";
   if (std::time(nullptr) >= invite.expires_unix_s) return "expired";
@@ -71,6 +64,7 @@ nlohmann::json ToJson(const net::Invite& invite) {
           {"label", invite.label},
           {"created_unix_s", invite.created_unix_s},
           {"expires_unix_s", invite.expires_unix_s},
+          {"waiting_room", invite.waiting_room},
           {"uses", invite.uses},
           {"used", invite.used},
           {"state", StateOf(invite)}};
@@ -112,7 +106,7 @@ absl::Status RunTrust(const Options& options) {
 absl::Status RunInvite(const Options& options, net::AccessClient& client) {
   const std::uint32_t life_s = options.life.empty() ? 0 : *ParseLife(options.life);
   const absl::StatusOr<net::NewInvite> made =
-      client.Create(options.invite_role, life_s, options.uses, options.label);
+      client.Create(options.invite_role, life_s, options.uses, options.label, options.waiting_room);
   if (!made.ok()) return made.status();
   if (options.json) {
     nlohmann::json json = ToJson(made->invite);
@@ -213,6 +207,12 @@ void AddAccess(CLI::App& app, Options& options) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   invite->add_option("--label", options.label, "Who it is for, at most 60 bytes");
+  invite->add_flag("--wait", options.waiting_room, "Who comes by it waits to be let in");
+  app.add_subcommand("waiting", "Who waits to be let in");
+  CLI::App* admit = app.add_subcommand("admit", "Let somebody in who waits");
+  admit->add_option("who", options.id, "Their name or id, as `saccade waiting` shows it")
+      ->required();
+  admit->add_flag("--refuse", options.refuse, "Send them away instead");
   app.add_subcommand("invites", "The invites of the server");
   CLI::App* audit = app.add_subcommand("audit", "Who did what, as far as the server keeps it");
   audit->add_option("--most", options.most, "So many of the newest")
@@ -224,7 +224,8 @@ void AddAccess(CLI::App& app, Options& options) {
 
 bool IsAccessCommand(Command command) {
   return command == Command::kTrust || command == Command::kInvite ||
-         command == Command::kInvites || command == Command::kRevoke || command == Command::kAudit;
+         command == Command::kInvites || command == Command::kRevoke ||
+         command == Command::kAudit || command == Command::kWaiting || command == Command::kAdmit;
 }
 
 absl::Status RunAccess(const Options& options) {
@@ -253,6 +254,10 @@ absl::Status RunAccess(const Options& options) {
       return RunInvites(options, client);
     case Command::kAudit:
       return RunAudit(options, client);
+    case Command::kWaiting:
+      return RunWaiting(options, client);
+    case Command::kAdmit:
+      return RunAdmit(options, client);
     default:
       return RunRevoke(options, client);
   }

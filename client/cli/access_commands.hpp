@@ -8,7 +8,8 @@
 
 namespace saccade::cli {
 
-/// Flags of how a server is reached, and the commands trust, invite, invites and revoke.
+/// Flags of how a server is reached, and the commands trust, invite, invites, revoke, audit,
+/// waiting and admit.
 void AddAccess(CLI::App& app, Options& options);
 
 bool IsAccessCommand(Command command);

@@ -120,7 +120,8 @@ absl::Status ResolveAccess(Options& options) {
   }
   if (options.invite.empty()) return absl::OkStatus();
   to.token.clear();
-  const absl::StatusOr<net::Pass> pass = net::AccessClient(to).Redeem(options.invite);
+  const absl::StatusOr<net::Pass> pass =
+      net::AccessClient(to).Redeem(options.invite, to.display_name);
   if (!pass.ok()) return pass.status();
   to.token = pass->token;
   return Keep({to.server, to.tls, to.root_pem, to.token, ""});

@@ -205,6 +205,8 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kInvites:
     case Command::kRevoke:
     case Command::kAudit:
+    case Command::kWaiting:
+    case Command::kAdmit:
       return RunAccess(options);
     case Command::kCameras:
     case Command::kRecord:

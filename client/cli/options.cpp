@@ -158,6 +158,8 @@ Command CommandOf(const CLI::App& app) {
       {"invites", Command::kInvites},
       {"revoke", Command::kRevoke},
       {"audit", Command::kAudit},
+      {"waiting", Command::kWaiting},
+      {"admit", Command::kAdmit},
       {"cameras", Command::kCameras},
       {"record", Command::kRecord},
       {"calibrate-camera", Command::kCalibrateCamera}};

@@ -39,6 +39,8 @@ enum class Command {
   kInvites,
   kRevoke,
   kAudit,
+  kWaiting,
+  kAdmit,
   kCameras,  // of this machine; asks no server
   kRecord,   // likewise
   kCalibrateCamera,
@@ -68,6 +70,8 @@ struct Options {
   std::string life, label;    // invite: "8h"; for whom
   std::uint32_t most = 1000;  // audit
   std::uint32_t uses = 1;     // invite
+  bool waiting_room = false;  // invite: who comes by it waits
+  bool refuse = false;        // admit: sends them away instead
   double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
   struct Record {
     std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them

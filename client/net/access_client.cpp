@@ -41,7 +41,13 @@ Invite FromProto(const v1::Invite& message) {
           message.expires_unix_s(),
           message.uses(),
           message.used(),
-          message.revoked()};
+          message.revoked(),
+          message.waiting_room()};
+}
+
+Waiting FromProto(const v1::WaitingPerson& message) {
+  return {message.id(),        message.display_name(), WordOf(message.role()),
+          message.invite_id(), message.label(),        message.since_unix_s()};
 }
 
 }  // namespace
@@ -73,23 +79,28 @@ AccessClient::AccessClient(const ConnectionOptions& options)
     : impl_(std::make_unique<Impl>(options)) {}
 AccessClient::~AccessClient() = default;
 
-absl::StatusOr<Pass> AccessClient::Redeem(const std::string& invite) {
+absl::StatusOr<Pass> AccessClient::Redeem(const std::string& invite,
+                                          const std::string& display_name) {
   static const std::string kMark = "#invite=";
   v1::RedeemRequest request;
   const std::size_t at = invite.find(kMark);
   request.set_invite(at == std::string::npos ? invite : invite.substr(at + kMark.size()));
+  request.set_display_name(display_name);
   const auto response = impl_->Call(&v1::AccessService::Stub::Redeem, request);
   if (!response.ok()) return response.status();
-  return Pass{response->token(), WordOf(response->role()), response->expires_unix_s()};
+  return Pass{response->token(), WordOf(response->role()), response->expires_unix_s(),
+              response->waiting()};
 }
 
 absl::StatusOr<NewInvite> AccessClient::Create(const std::string& role, std::uint32_t life_s,
-                                               std::uint32_t uses, const std::string& label) {
+                                               std::uint32_t uses, const std::string& label,
+                                               bool waiting_room) {
   v1::CreateInviteRequest request;
   request.set_role(RoleOf(role));
   request.set_life_s(life_s);
   request.set_uses(uses);
   request.set_label(label);
+  request.set_waiting_room(waiting_room);
   const auto response = impl_->Call(&v1::AccessService::Stub::CreateInvite, request);
   if (!response.ok()) return response.status();
   return NewInvite{FromProto(response->invite()), response->link()};
@@ -102,6 +113,24 @@ absl::StatusOr<std::vector<Invite>> AccessClient::List() {
   std::vector<Invite> all;
   for (const v1::Invite& invite : response->invites()) all.push_back(FromProto(invite));
   return all;
+}
+
+absl::StatusOr<std::vector<Waiting>> AccessClient::WaitingRoom() {
+  const auto response =
+      impl_->Call(&v1::AccessService::Stub::ListWaiting, v1::ListWaitingRequest());
+  if (!response.ok()) return response.status();
+  std::vector<Waiting> all;
+  for (const v1::WaitingPerson& person : response->people()) all.push_back(FromProto(person));
+  return all;
+}
+
+absl::StatusOr<Waiting> AccessClient::Admit(const std::string& id, bool refuse) {
+  v1::AdmitRequest request;
+  request.set_id(id);
+  request.set_refuse(refuse);
+  const auto response = impl_->Call(&v1::AccessService::Stub::Admit, request);
+  if (!response.ok()) return response.status();
+  return FromProto(response->person());
 }
 
 absl::StatusOr<int> AccessClient::Revoke(const std::string& id) {

@@ -18,6 +18,7 @@ struct Invite {
   std::int64_t created_unix_s = 0, expires_unix_s = 0;
   std::uint32_t uses = 1, used = 0;
   bool revoked = false;
+  bool waiting_room = false;
 };
 struct NewInvite {
   Invite invite;
@@ -27,6 +28,13 @@ struct NewInvite {
 struct Pass {
   std::string token, role;
   std::int64_t expires_unix_s = 0;
+  bool waiting = false;  // to be let in
+};
+
+/// Somebody who waits to be let in.
+struct Waiting {
+  std::string id, display_name, role, invite_id, label;
+  std::int64_t since_unix_s = 0;
 };
 
 /// What somebody did. Ids as in presence and in the list of invites; empty: not known.
@@ -42,11 +50,15 @@ class AccessClient {
   ~AccessClient();
 
   /// `invite`: a link, or what stands behind its #invite=.
-  absl::StatusOr<Pass> Redeem(const std::string& invite);
+  absl::StatusOr<Pass> Redeem(const std::string& invite, const std::string& display_name = "");
   // With the owner's token. `life_s` and `uses` 0: as the server has them.
   absl::StatusOr<NewInvite> Create(const std::string& role, std::uint32_t life_s,
-                                   std::uint32_t uses, const std::string& label);
+                                   std::uint32_t uses, const std::string& label,
+                                   bool waiting_room = false);
   absl::StatusOr<std::vector<Invite>> List();
+  absl::StatusOr<std::vector<Waiting>> WaitingRoom();
+  /// Lets somebody in, or ends their pass.
+  absl::StatusOr<Waiting> Admit(const std::string& id, bool refuse);
   /// How many passes ended with it.
   absl::StatusOr<int> Revoke(const std::string& id);
   /// The newest `most` (1 to 10000; 0: 1000), oldest first.

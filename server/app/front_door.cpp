@@ -2,12 +2,15 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <absl/strings/strip.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
 #include <future>
+#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "server/store/store_files.hpp"
@@ -19,6 +22,7 @@ namespace saccade {
 namespace {
 
 constexpr std::chrono::seconds kPatience(5);  // of a disk, for one invite
+constexpr std::chrono::seconds kLook(10);     // for another certificate
 constexpr std::int64_t kConsoleLife_s = 8 * 3600;
 
 std::int64_t NowUnix_s() {
@@ -66,6 +70,15 @@ std::string GivenName(const ServerIdentity& identity) {
   return facts->names.addresses.empty() ? "" : facts->names.addresses.front();
 }
 
+void SayNotNamed(const ServerIdentity& identity) {
+  if (identity.not_named.empty()) return;
+  Log(absl::StrCat(
+      "tls: this server's authority was made for other names, so nobody can connect by ",
+      absl::StrJoin(identity.not_named, ", "),
+      "; give a certificate, or move DATA_DIR/tls away: then a new authority is made, "
+      "which everybody has to trust anew"));
+}
+
 absl::StatusOr<Issued> CreateNow(AccessBook& book, const InviteDraft& draft) {
   const auto made = std::make_shared<std::promise<absl::StatusOr<Issued>>>();
   std::future<absl::StatusOr<Issued>> answer = made->get_future();
@@ -82,20 +95,18 @@ absl::StatusOr<Issued> CreateNow(AccessBook& book, const InviteDraft& draft) {
 absl::StatusOr<std::unique_ptr<FrontDoor>> FrontDoor::Open(const ServerConfig& config) {
   std::unique_ptr<FrontDoor> door(new FrontDoor(config));
   if (config.WantsTls(config.grpc) || config.WantsTls(config.http)) {
-    ServerNames names = ServerNames::OfThisMachine();
-    if (!config.public_url.empty()) names.Add(HostOfUrl(config.public_url));
-    absl::StatusOr<ServerIdentity> identity =
-        config.tls_certificate.empty()
-            ? EnsureServerIdentity(config.data_dir, names, NowUnix_s())
-            : LoadServerIdentity(config.tls_certificate, config.tls_key, NowUnix_s());
+    absl::StatusOr<ServerIdentity> identity = door->Identify();
     if (!identity.ok()) return identity.status();
     const absl::StatusOr<CertificateFacts> facts = InspectCertificate(identity->chain_pem);
     if (facts.ok()) door->allowed_hosts_ = facts->names.dns;
     door->identity_ = *std::move(identity);
+    door->served_chain_ = door->identity_->chain_pem;
+    SayNotNamed(*door->identity_);
   }
   if (!config.public_url.empty()) door->allowed_hosts_.push_back(HostOfUrl(config.public_url));
   AccessBook::Options options;
   options.token_required = config.auth_required;
+  options.waiting_room = config.waiting_room;
   if (config.auth_required) {
     absl::StatusOr<std::unique_ptr<AccessBook>> book = AccessBook::Open(config.data_dir, options);
     if (!book.ok()) return book.status();
@@ -108,7 +119,46 @@ absl::StatusOr<std::unique_ptr<FrontDoor>> FrontDoor::Open(const ServerConfig& c
   return door;
 }
 
+absl::StatusOr<ServerIdentity> FrontDoor::Identify() const {
+  if (!config_.tls_certificate.empty()) {
+    return LoadServerIdentity(config_.tls_certificate, config_.tls_key, NowUnix_s());
+  }
+  ServerNames names = ServerNames::OfThisMachine();
+  if (!config_.public_url.empty()) names.Add(HostOfUrl(config_.public_url));
+  return EnsureServerIdentity(config_.data_dir, names, NowUnix_s());
+}
+
+void FrontDoor::Watch(OnNew on_new) {
+  watch_ = {};  // stopped and joined
+  if (on_new == nullptr || !identity_) return;
+  watch_ = std::jthread([this, on_new = std::move(on_new)](const std::stop_token& stop) {
+    std::mutex mutex;
+    std::condition_variable_any never;
+    std::unique_lock lock(mutex);
+    while (!never.wait_for(lock, stop, kLook, [&stop] { return stop.stop_requested(); })) {
+      Look(on_new);
+    }
+  });
+}
+
+void FrontDoor::Look(const OnNew& on_new) {
+  absl::StatusOr<ServerIdentity> now = Identify();
+  if (!now.ok()) {
+    if (said_ != now.status().message()) {
+      Log(absl::StrCat("tls: the present certificate stays: ", now.status().message()));
+    }
+    said_ = std::string(now.status().message());
+    return;
+  }
+  said_.clear();
+  if (now->chain_pem == served_chain_) return;
+  served_chain_ = now->chain_pem;
+  SayNotNamed(*now);
+  on_new(*now);
+}
+
 FrontDoor::~FrontDoor() {
+  Watch(nullptr);
   if (wrote_owner_) ::unlink((config_.data_dir / "owner.json").c_str());
 }
 
@@ -178,8 +228,8 @@ void FrontDoor::SayInvites() {
   Log(absl::StrCat("invites: `saccade invite --role pilot --data-dir ", config_.data_dir.string(),
                    "` makes a link"));
   if (::isatty(STDERR_FILENO) == 0) return;
-  const InviteDraft pilot{AccessRole::kPilot, kConsoleLife_s, 1, "console"};
-  const InviteDraft wearer{AccessRole::kWearer, kConsoleLife_s, 1, "console"};
+  const InviteDraft pilot{AccessRole::kPilot, kConsoleLife_s, 1, "console", false};
+  const InviteDraft wearer{AccessRole::kWearer, kConsoleLife_s, 1, "console", false};
   const absl::StatusOr<Issued> expert = CreateNow(*access_, pilot);
   const absl::StatusOr<Issued> phone = CreateNow(*access_, wearer);
   if (!expert.ok() || !phone.ok()) {

@@ -2,9 +2,11 @@
 
 #include <absl/status/statusor.h>
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "server/app/server_config.hpp"
@@ -24,6 +26,12 @@ class FrontDoor {
   static absl::StatusOr<std::unique_ptr<FrontDoor>> Open(const ServerConfig& config);
   ~FrontDoor();
 
+  /// Looks every ten seconds whether there is another certificate: the given files were changed, or
+  /// the own one expires, or this machine has a new name or address; `on_new` hears of it, on a
+  /// thread of this object's. Null: no more. Does nothing where nobody speaks TLS.
+  using OnNew = std::function<void(const ServerIdentity&)>;
+  void Watch(OnNew on_new);
+
   /// Nothing: `address` speaks plain.
   std::optional<ServerIdentity> TlsOf(const Address& address) const;
   AccessBook& access() { return *access_; }
@@ -40,6 +48,8 @@ class FrontDoor {
  private:
   explicit FrontDoor(const ServerConfig& config) : config_(config) {}
   std::string BaseUrl(int http_port) const;
+  absl::StatusOr<ServerIdentity> Identify() const;
+  void Look(const OnNew& on_new);
   void SayInvites();
   const char* WearerPath() const;  // of the page that is theirs
 
@@ -49,6 +59,9 @@ class FrontDoor {
   std::vector<std::string> allowed_hosts_;
   std::string base_url_;  // before the first call is served
   bool wrote_owner_ = false;
+  std::string served_chain_;  // of the watch, once it runs
+  std::string said_;          // the last trouble with a certificate
+  std::jthread watch_;
 };
 
 }  // namespace saccade

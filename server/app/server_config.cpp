@@ -17,6 +17,7 @@
 #include "server/encode/video_encoder.hpp"
 #include "server/gaze/gaze_options.hpp"
 #include "server/mount/drivers/drivers.hpp"
+#include "server/pipeline/peer_address.hpp"
 #include "server/tracker/tracker_options.hpp"
 #include "shared/io/toml_file.hpp"
 #include "shared/version/version.hpp"
@@ -25,16 +26,16 @@ namespace saccade {
 namespace {
 
 constexpr std::int64_t kMostRunFor_s = 1'000'000'000;  // 31 years
-constexpr double kMostLimitsScale = 1000;
 
 // What the flags and the file give as text, before it means anything.
 struct Raw {
   std::string config, source, mount = "none", data_dir, camera, grpc = "127.0.0.1:50051",
                               http = "127.0.0.1:8080", gl = "osmesa", speed = "realtime", sim_truth,
-                              web_root, public_url, tls_certificate, tls_key;
-  bool insecure = false, tls_required = false, auth_required = false;
+                              web_root, public_url, trusted_proxy, tls_certificate, tls_key,
+                              client_ca;
+  std::map<std::string, AccessRole> client_roles;
+  bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
   double run_for_s = -1.0;
-  double limits_scale = 1.0;
   std::int64_t bit_rate = 0;
   std::int64_t seed = 1;
 };
@@ -62,6 +63,10 @@ const std::vector<Setting>& Settings() {
        "serve beyond this machine without TLS and invites: for laboratories"},
       {"public_url", "--public-url", &Raw::public_url,
        "https://HOST[:PORT] that invite links begin with, e.g. of a reverse proxy"},
+      {"trusted_proxy", "--trusted-proxy", &Raw::trusted_proxy,
+       "address of the reverse proxy, whose X-Forwarded-For says who calls"},
+      {"waiting_room", "--waiting-room", &Raw::waiting_room,
+       "who comes by an invite waits until the wearer, or `saccade admit`, lets them in"},
       {"gl", "--gl", &Raw::gl, "osmesa | egl"},
       {"speed", "--speed", &Raw::speed, "realtime | max (every frame, as fast as it can)"},
       {nullptr, "--run-for", &Raw::run_for_s, "end after so many seconds"},
@@ -71,6 +76,8 @@ const std::vector<Setting>& Settings() {
       {"tls.certificate", "--tls-certificate", &Raw::tls_certificate,
        "PEM file, with those above it; empty: one of an authority of this server's own"},
       {"tls.key", "--tls-key", &Raw::tls_key, "PEM file of its private key"},
+      {"tls.client_ca", "--client-ca", &Raw::client_ca,
+       "PEM file: a client's certificate by it is an identity, its role in [client_roles]"},
       {"tls.required", nullptr, &Raw::tls_required, "TLS on loopback, too"},
       {"auth.required", nullptr, &Raw::auth_required, "invites on loopback, too"},
   };
@@ -107,7 +114,6 @@ std::string BitRateWords() {
   return absl::StrCat(kLeastBitRate_bit_s, " to ", kMostBitRate_bit_s,
                       ", or 0: by the size of the picture");
 }
-std::string LimitsScaleWords() { return absl::StrCat("0 (no limits) to ", kMostLimitsScale); }
 
 /// A file that says everything and changes nothing.
 std::string DefaultFile() {
@@ -137,10 +143,8 @@ std::string DefaultFile() {
   }
   absl::StrAppend(&text, "\n[video]\n");
   add("bit_rate_bit_s = 0", BitRateWords());
-  absl::StrAppend(&text, "\n[limits]\n");
-  add("scale = 1.0", LimitsScaleWords() + ", of what one caller may ask for");
-  absl::StrAppend(&text, "\n", TrackerOptions::Describe(), "\n", GazeOptions::Describe(), "\n",
-                  MountDrivers().Describe());
+  absl::StrAppend(&text, "\n", LimitSettings::Describe(), "\n", TrackerOptions::Describe(), "\n",
+                  GazeOptions::Describe(), "\n", MountDrivers().Describe());
   return text;
 }
 
@@ -196,22 +200,19 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
         return Bad(absl::StrCat(raw.config, ": unknown key video.", *keys.begin()));
       left.erase("video");
     }
-    if (root.contains("limits")) {
-      const toml::value& limits = toml::find(root, "limits");
-      std::set<std::string> keys;
-      for (const auto& [key, value] : limits.as_table()) keys.insert(key);
-      if (keys.erase("scale") > 0) {
-        const toml::value& scale = toml::find(limits, "scale");
-        raw.limits_scale =
-            scale.is_integer() ? static_cast<double>(scale.as_integer()) : scale.as_floating();
+    if (root.contains("client_roles")) {
+      for (const auto& [name, word] : toml::find(root, "client_roles").as_table()) {
+        const AccessRole role = AccessRoleOf(word.as_string().str);
+        if (role < AccessRole::kViewer || role > AccessRole::kWearer) {
+          return Bad(absl::StrCat(raw.config, ": client_roles.", name, ": '", word.as_string().str,
+                                  "'; give viewer, annotator, pilot or wearer"));
+        }
+        raw.client_roles[name] = role;
       }
-      if (!keys.empty()) {
-        return Bad(absl::StrCat(raw.config, ": unknown key limits.", *keys.begin()));
-      }
-      left.erase("limits");
+      left.erase("client_roles");
     }
-    // Read by TrackerOptions, GazeOptions and the mounts.
-    for (const char* table : {"tracker", "gaze"}) left.erase(table);
+    // Read by TrackerOptions, GazeOptions, LimitSettings and the mounts.
+    for (const char* table : {"tracker", "gaze", "limits"}) left.erase(table);
     for (const std::string& table : MountDrivers().Tables()) left.erase(table);
     if (!left.empty()) return Bad(absl::StrCat(raw.config, ": unknown key ", *left.begin()));
   } catch (const std::exception& error) {
@@ -267,6 +268,22 @@ absl::Status CheckIdentity(const Raw& raw, ServerConfig& config) {
         "--insecure: invites would go over the network in plain text; leave auth.required "
         "out, or --insecure");
   }
+  config.client_ca = raw.client_ca;
+  config.client_roles = raw.client_roles;
+  if (!raw.client_ca.empty() && !(config.WantsTls(config.grpc) && config.auth_required)) {
+    return Bad(
+        "--client-ca: machines show certificates where there is TLS, and need to where tokens "
+        "are asked for: tls.required and auth.required on loopback, no --insecure");
+  }
+  config.waiting_room = raw.waiting_room;
+  if (raw.waiting_room && !config.auth_required) {
+    return Bad("--waiting-room: without invites everybody is in: set auth.required");
+  }
+  config.trusted_proxy = raw.trusted_proxy;
+  if (!raw.trusted_proxy.empty() && ForwardedFor(raw.trusted_proxy) != raw.trusted_proxy) {
+    return Bad(absl::StrCat("--trusted-proxy: '", raw.trusted_proxy,
+                            "' is no address of one machine, like 127.0.0.1"));
+  }
   config.public_url = raw.public_url;
   absl::string_view trimmed = config.public_url;
   absl::ConsumeSuffix(&trimmed, "/");
@@ -308,10 +325,9 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
     return Bad(absl::StrCat("video.bit_rate_bit_s: ", raw.bit_rate, ": give ", BitRateWords()));
   }
   config.video_bit_rate_bit_s = static_cast<int>(raw.bit_rate);
-  if (!(raw.limits_scale >= 0 && raw.limits_scale <= kMostLimitsScale)) {
-    return Bad(absl::StrCat("limits.scale: ", raw.limits_scale, ": ", LimitsScaleWords()));
+  if (!raw.config.empty()) {
+    if (absl::Status limits = config.limits.LoadToml(raw.config); !limits.ok()) return limits;
   }
-  config.limits_scale = raw.limits_scale;
   config.web_root = raw.web_root;
   if (raw.seed < 0) return Bad(absl::StrCat("seed: ", raw.seed, ": give a whole number from 0"));
   config.seed = static_cast<std::uint64_t>(raw.seed);

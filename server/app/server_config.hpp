@@ -4,10 +4,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
+#include "server/app/limit_settings.hpp"
 #include "server/gl/gl_context.hpp"
+#include "server/identity/access.hpp"
 
 namespace saccade {
 
@@ -33,15 +36,19 @@ struct ServerConfig {
   bool insecure = false;
   std::filesystem::path tls_certificate, tls_key;  // empty: of an authority of our own
   bool tls_required = false;                       // on loopback, too
+  std::filesystem::path client_ca;                 // who vouches for machines; empty: nobody
+  std::map<std::string, AccessRole> client_roles;  // [client_roles], by common name or URI
+  bool waiting_room = false;                       // who comes by an invite waits to be let in
   bool auth_required = false;  // calls need a token: asked for, or beyond loopback and not insecure
   std::string public_url;      // without a slash at its end; empty: found out
+  std::string trusted_proxy;   // IP literal of whose X-Forwarded-For is believed; empty: nobody's
   GlBackend gl = GlBackend::kOsmesa;
   bool every_frame = false;  // --speed max
   std::optional<double> run_for_s;
   std::filesystem::path sim_truth;
   // Only in the file: reasons to change them are rare.
   int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size
-  double limits_scale = 1;         // limits.scale: of server/rpc/admission.hpp; 0: none
+  LimitSettings limits;            // [limits]
   std::filesystem::path web_root;  // web_root
   std::uint64_t seed = 1;          // seed
   /// Its [tracker], [gaze], [mount_model] and drivers' tables are theirs to read.

@@ -9,6 +9,7 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "server/app/apply_limits.hpp"
 #include "server/app/engine.hpp"
 #include "server/app/front_door.hpp"
 #include "server/app/memory.hpp"
@@ -24,6 +25,7 @@
 #include "server/store/annotation_store.hpp"
 #include "server/tracker/tracker.hpp"
 #include "shared/io/log.hpp"
+#include "shared/io/regular_file.hpp"
 #include "shared/version/version.hpp"
 
 namespace saccade {
@@ -84,6 +86,7 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, E
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);
   if (!store.ok()) return store.status();
   options.version = Version();
+  ApplyLimits(config, options.anchors);
   options.mount = opened->mount.mount;
   options.crop = opened->mount.crop;
   options.every_frame = config.every_frame;
@@ -100,7 +103,13 @@ void SayReady(const ServerConfig& config, int grpc_port, int http_port) {
   Announce(ready.dump());
 }
 
-void LetIn(FrontDoor& door, const ServerConfig& config, RpcServerOptions& options) {
+constexpr std::size_t kMaxPemBytes = 256 * 1024;
+
+absl::Status InvalidCa(absl::string_view why) {
+  return absl::InvalidArgumentError(absl::StrCat("tls.client_ca: ", why));
+}
+
+absl::Status LetIn(FrontDoor& door, const ServerConfig& config, RpcServerOptions& options) {
   options.access = &door.access();
   options.insecure = door.insecure();
   options.make_link = [&door](AccessRole role, const std::string& token) {
@@ -109,6 +118,25 @@ void LetIn(FrontDoor& door, const ServerConfig& config, RpcServerOptions& option
   if (const std::optional<ServerIdentity> tls = door.TlsOf(config.grpc)) {
     options.tls = TlsPair{tls->chain_pem, tls->key_pem};
   }
+  options.machines = config.client_roles;
+  if (config.client_ca.empty()) return absl::OkStatus();
+  absl::StatusOr<std::string> pem =
+      ReadRegularFile(config.client_ca, kMaxPemBytes, "a certificate");
+  if (!pem.ok()) return InvalidCa(pem.status().message());
+  if (!InspectCertificate(*pem).ok()) return InvalidCa("holds no certificate (PEM)");
+  options.client_ca_pem = *std::move(pem);
+  return absl::OkStatus();
+}
+
+void Renew(const ServerIdentity& renewed, const ServerConfig& config, RpcServer& rpc,
+           Gateway& gateway) {
+  absl::Status status;
+  if (config.WantsTls(config.http)) status = gateway.SetTls(renewed.chain_pem, renewed.key_pem);
+  if (status.ok() && config.WantsTls(config.grpc)) {
+    status = rpc.SetTls({renewed.chain_pem, renewed.key_pem});
+  }
+  Log(status.ok() ? "tls: who connects from now on sees the new certificate"
+                  : absl::StrCat("tls: the new certificate is not served: ", status.message()));
 }
 
 // One line, also where a library's own words have several.
@@ -136,11 +164,11 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   RpcServerOptions rpc_options;
   rpc_options.host = config.grpc.host;
   rpc_options.port = config.grpc.port;
-  rpc_options.limits = RpcLimits().Scaled(config.limits_scale);
+  ApplyLimits(config, rpc_options);
   shutdown.SetPhase("making certificates");
   const absl::StatusOr<std::unique_ptr<FrontDoor>> door = FrontDoor::Open(config);
   if (!door.ok()) return door.status();
-  LetIn(**door, config, rpc_options);
+  if (absl::Status let = LetIn(**door, config, rpc_options); !let.ok()) return let;
   shutdown.SetPhase("opening the ports");
   absl::StatusOr<std::unique_ptr<RpcServer>> rpc = RpcServer::Start(rpc_options, **engine, hub);
   if (!rpc.ok()) return rpc.status();
@@ -160,11 +188,14 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
     gateway_options.root_pem = tls->root_pem;
     gateway_options.root_sha256 = tls->root_sha256;
   }
+  ApplyLimits(config, **rpc, gateway_options);
   absl::StatusOr<std::unique_ptr<Gateway>> gateway =
       Gateway::Start(gateway_options, (*rpc)->InProcessChannel());
   if (!gateway.ok()) return gateway.status();
   const absl::Status announced = (*door)->Announce((*rpc)->port(), (*gateway)->port());
   if (!announced.ok()) return announced;
+  (*door)->Watch([&](const ServerIdentity& renewed) { Renew(renewed, config, **rpc, **gateway); });
+  const absl::Cleanup no_watch = [&door] { (*door)->Watch(nullptr); };
   (*engine)->Start();
   shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());

@@ -15,6 +15,7 @@
 #include "server/gateway/http_connection.hpp"
 #include "server/gateway/trust_page.hpp"
 #include "server/pipeline/descriptors.hpp"
+#include "server/pipeline/peer_address.hpp"
 #include "shared/io/log.hpp"
 
 namespace saccade {
@@ -30,8 +31,8 @@ absl::Status GatewayOptions::Validate() const {
   if (max_request_bytes == 0) {
     return absl::InvalidArgumentError("gateway.max_request_bytes: 0; give at least 1");
   }
-  if (max_connections <= 0) {
-    return absl::InvalidArgumentError("gateway.max_connections: give at least 1");
+  if (connections.all <= 0) {
+    return absl::InvalidArgumentError("gateway.connections: give at least 1");
   }
   if (read_timeout.count() <= 0 || write_timeout.count() <= 0) {
     return absl::InvalidArgumentError("gateway.read_timeout, write_timeout: give more than 0");
@@ -56,7 +57,10 @@ class Gateway::Impl {
                  options.write_timeout,
                  {},
                  nullptr,
-                 options.wearer} {
+                 options.wearer,
+                 options.admit,
+                 options.trusted_proxy},
+        gate_(options.connections) {
     context_.call = [this, channel = std::move(channel)](CallRequest request,
                                                          UpstreamCall::Handlers handlers) {
       // The guard keeps `Run` going until the call is over, so that its end is never lost.
@@ -106,21 +110,34 @@ class Gateway::Impl {
 
   int port() const { return port_; }
 
+  absl::Status SetTls(const std::string& chain_pem, const std::string& key_pem) {
+    absl::StatusOr<Tls> tls = MakeTls(chain_pem, key_pem);
+    if (!tls.ok()) return tls.status();
+    net::post(io_, [this, tls = *std::move(tls)] { context_.tls = tls; });
+    return absl::OkStatus();
+  }
+
  private:
   absl::Status PrepareTls() {
     if (options_.tls_chain_pem.empty()) return absl::OkStatus();
-    const std::string& chain = options_.tls_chain_pem;
-    const std::string& key = options_.tls_key_pem;
+    auto tls = MakeTls(options_.tls_chain_pem, options_.tls_key_pem);
+    if (!tls.ok()) return tls.status();
+    context_.tls = *std::move(tls);
+    return absl::OkStatus();
+  }
+
+  using Tls = std::shared_ptr<net::ssl::context>;
+  static absl::StatusOr<Tls> MakeTls(const std::string& chain, const std::string& key) {
+    auto tls = std::make_shared<net::ssl::context>(net::ssl::context::tls_server);
     error_code error;
-    tls_.use_certificate_chain(net::buffer(chain), error);
-    if (!error) tls_.use_private_key(net::buffer(key), net::ssl::context::pem, error);
+    tls->use_certificate_chain(net::buffer(chain), error);
+    if (!error) tls->use_private_key(net::buffer(key), net::ssl::context::pem, error);
     if (error) {
       return absl::InvalidArgumentError(absl::StrCat("tls: certificate or key: ", error.message()));
     }
-    SSL_CTX_set_min_proto_version(tls_.native_handle(), TLS1_3_VERSION);
-    SSL_CTX_set_alpn_select_cb(tls_.native_handle(), ChooseHttp11, nullptr);
-    context_.tls = &tls_;
-    return absl::OkStatus();
+    SSL_CTX_set_min_proto_version(tls->native_handle(), TLS1_3_VERSION);
+    SSL_CTX_set_alpn_select_cb(tls->native_handle(), ChooseHttp11, nullptr);
+    return tls;
   }
 
   static int ChooseHttp11(SSL*, const unsigned char** out, unsigned char* size,
@@ -163,24 +180,45 @@ class Gateway::Impl {
   }
 
   void Serve(tcp::socket socket) {
-    if (DescriptorsRunOut(socket.native_handle()) ||
-        connections_.size() >= static_cast<std::size_t>(options_.max_connections)) {
-      if (!CloseLongestIdle()) return;
-    }
     error_code error;
     const tcp::endpoint peer = socket.remote_endpoint(error);
     if (error) return;  // gone already
-    socket.set_option(tcp::no_delay(true), error);
-    NoticeDeadPeer(socket.native_handle());
     // An IPv4 caller of a socket for both is himself, not the network ::ffff:0:0.
     net::ip::address address = peer.address();
     if (address.is_v6() && address.to_v6().is_v4_mapped()) {
       address = net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
     }
+    if (!Welcome(address.to_string())) return;
+    if (DescriptorsRunOut(socket.native_handle()) ||
+        connections_.size() >= static_cast<std::size_t>(options_.connections.all)) {
+      if (!CloseLongestIdle()) return;
+    }
+    socket.set_option(tcp::no_delay(true), error);
+    NoticeDeadPeer(socket.native_handle());
     const auto connection =
         HttpConnection::Start(std::move(socket), address.to_string(), context_,
                               [this](HttpConnection* gone) { connections_.erase(gone); });
     connections_[connection.get()] = connection;
+  }
+
+  bool Welcome(const std::string& address) {
+    const std::string peer = PeerKey(address);
+    const Timestamp now_ns = MonotonicNow();
+    absl::Status status = gate_.Hurry(peer, now_ns);
+    if (status.ok() && gate_.Counts(peer)) {
+      ConnectionCounts counts;
+      for (const auto& [raw, weak] : connections_) {
+        if (PeerKey(raw->peer()) != peer) continue;
+        ++counts.of_address;
+        if (!raw->heard()) ++counts.unheard_of_address;
+      }
+      status = gate_.Admit(peer, counts);
+    }
+    if (!status.ok() && now_ns - said_ns_ > 1'000'000'000) {
+      said_ns_ = now_ns;
+      Log(absl::StrCat("gateway: ", peer, " was turned away: ", status.message()));
+    }
+    return status.ok();
   }
 
   // Who connects and asks nothing must not keep out who asks. False: nobody is idle.
@@ -197,7 +235,8 @@ class Gateway::Impl {
 
   GatewayOptions options_;
   HttpContext context_;
-  net::ssl::context tls_{net::ssl::context::tls_server};
+  ConnectionGate gate_;
+  Timestamp said_ns_ = 0;
   std::unordered_map<HttpConnection*, std::weak_ptr<HttpConnection>> connections_;
   bool stopping_ = false;
   int port_ = 0;
@@ -222,5 +261,8 @@ Gateway::Gateway(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Gateway::~Gateway() { Stop(); }
 int Gateway::port() const { return impl_->port(); }
 void Gateway::Stop() { impl_->Stop(); }
+absl::Status Gateway::SetTls(const std::string& chain_pem, const std::string& key_pem) {
+  return impl_->SetTls(chain_pem, key_pem);
+}
 
 }  // namespace saccade

@@ -3,12 +3,16 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "server/pipeline/connection_limits.hpp"
 
 namespace grpc {
 class Channel;
@@ -17,6 +21,14 @@ class Channel;
 namespace saccade {
 
 class WearerPort;
+
+/// Why a request is not served: it, or what came before it, was too much.
+struct GatewayRefusal {
+  int code = 8;         // as in gRPC
+  std::string message;  // with the limit
+  std::string details;  // google.rpc.Status with RetryInfo, encoded
+  std::chrono::nanoseconds retry_after{};
+};
 
 /// How the gateway serves browsers.
 struct GatewayOptions {
@@ -30,8 +42,16 @@ struct GatewayOptions {
   /// how a foreign page would get in (DNS rebinding).
   std::vector<std::string> allowed_hosts;
   std::size_t max_request_bytes = 4 * 1024 * 1024;  ///< body of one RPC
-  int max_connections = 1024;                       ///< further ones are closed at once
-  std::chrono::milliseconds read_timeout{60'000};   ///< an idle or slow request
+  /// Of `all`, further ones take the place of who has been idle for longest.
+  ConnectionLimits connections;
+  /// Asked with the head of each request, before its body is read: the caller's address, its
+  /// Authorization, and the bytes to come. Null: everything is served. On the gateway's thread.
+  std::function<std::optional<GatewayRefusal>(const std::string& address,
+                                              absl::string_view authorization, std::size_t bytes)>
+      admit;
+  /// Address of the one proxy whose X-Forwarded-For says who calls; empty: nobody's does.
+  std::string trusted_proxy;
+  std::chrono::milliseconds read_timeout{60'000};  ///< an idle or slow request
   /// One piece of an answer not taken by the browser for so long ends its connection.
   std::chrono::milliseconds write_timeout{30'000};
 
@@ -69,6 +89,10 @@ class Gateway {
 
   /// The port bound.
   int port() const;
+
+  /// Another certificate and key for who connects from now on; who is connected stays. Only where
+  /// TLS is spoken. InvalidArgument: they cannot be used, and nothing changes.
+  absl::Status SetTls(const std::string& chain_pem, const std::string& key_pem);
 
   /// Cancels what is under way, closes every connection, joins the thread. May be called twice.
   void Stop();

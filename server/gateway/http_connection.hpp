@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "server/gateway/gateway.hpp"
 #include "server/gateway/host_check.hpp"
 #include "server/gateway/static_files.hpp"
 #include "server/gateway/upstream_call.hpp"
@@ -25,8 +26,13 @@ struct HttpContext {
   std::chrono::milliseconds write_timeout{};
   /// Starts a call to the gRPC server.
   std::function<std::shared_ptr<UpstreamCall>(CallRequest, UpstreamCall::Handlers)> call;
-  boost::asio::ssl::context* tls = nullptr;  // null: plain
-  WearerPort* wearer = nullptr;              // null: no phone can be the camera
+  /// New for each certificate, which who is connected does not notice; null: plain.
+  std::shared_ptr<boost::asio::ssl::context> tls;
+  WearerPort* wearer = nullptr;  // null: no phone can be the camera
+  // As GatewayOptions has them.
+  std::function<std::optional<GatewayRefusal>(const std::string&, absl::string_view, std::size_t)>
+      admit;
+  std::string trusted_proxy;
 };
 
 /// One browser connection: requests one after the other, on the gateway's thread.
@@ -42,6 +48,10 @@ class HttpConnection {
   virtual void Close() = 0;
   /// Since when it waits for a whole request; nothing while one is being answered.
   virtual std::optional<std::chrono::steady_clock::time_point> idle_since() const = 0;
+  /// Whether a whole request came already.
+  virtual bool heard() const = 0;
+  /// Of the socket, without the port.
+  virtual const std::string& peer() const = 0;
 };
 
 }  // namespace saccade

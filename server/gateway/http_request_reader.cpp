@@ -7,7 +7,7 @@ namespace saccade {
 namespace http = boost::beast::http;
 
 HttpRequestReader::HttpRequestReader(std::size_t max_head_bytes, std::size_t max_body_bytes)
-    : max_head_bytes_(max_head_bytes) {
+    : max_head_bytes_(max_head_bytes), max_body_bytes_(max_body_bytes) {
   parser_.eager(true);
   parser_.header_limit(static_cast<std::uint32_t>(max_head_bytes));
   parser_.body_limit(max_body_bytes);
@@ -20,6 +20,12 @@ HttpRequestReader::Result HttpRequestReader::Take(boost::beast::flat_buffer& buf
   } catch (const std::exception&) {
     return Result::kMalformed;
   }
+}
+
+std::size_t HttpRequestReader::announced_body_bytes() const {
+  if (parser_.chunked()) return max_body_bytes_;
+  const auto length = parser_.content_length();
+  return length ? static_cast<std::size_t>(*length) : 0;
 }
 
 // Chunks may be cut small, so as many bytes as the body has are theirs; the rest has one limit.

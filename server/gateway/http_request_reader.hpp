@@ -29,11 +29,17 @@ class HttpRequestReader {
 
   const Request& request() const { return parser_.get(); }
 
+  /// Whether the head is there, which says what the rest will be.
+  bool head_done() const { return parser_.is_header_done(); }
+  /// Bytes of the body to come, as the head says; where it does not (chunks), the most there may
+  /// be.
+  std::size_t announced_body_bytes() const;
+
  private:
   Result Parse(boost::beast::flat_buffer& buffer);
   bool Wasteful(std::size_t waiting) const;
 
-  const std::size_t max_head_bytes_;
+  const std::size_t max_head_bytes_, max_body_bytes_;
   boost::beast::http::request_parser<boost::beast::http::string_body> parser_;
   std::size_t taken_ = 0;  // bytes of this request, all kinds
 };

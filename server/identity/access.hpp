@@ -28,6 +28,7 @@ struct Access {
   std::string id;
   AccessRole role = AccessRole::kWearer;
   std::int64_t expires_unix_s = 0;  // 0: never
+  bool waiting = false;             // to be let in: may do nothing yet, and so has no role
 };
 
 }  // namespace saccade

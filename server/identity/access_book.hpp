@@ -22,6 +22,7 @@ struct InviteFacts {
   std::int64_t created_unix_s = 0, expires_unix_s = 0;
   int uses = 1, used = 0;
   bool revoked = false;
+  bool waits = false;  // who comes by it waits to be let in
 };
 
 struct InviteDraft {
@@ -29,6 +30,7 @@ struct InviteDraft {
   std::int64_t life_s = 8 * 3600;         // 60 to 31'536'000
   int uses = 1;                           // 1 to 1000
   std::string label;                      // at most 60 bytes
+  bool waits = false;                     // who comes by it waits to be let in
   /// InvalidArgument names the field.
   absl::Status Validate() const;
 };
@@ -37,6 +39,16 @@ struct InviteDraft {
 struct Issued {
   InviteFacts invite;
   std::string token;
+  bool waiting = false;  // of a pass: it opens nothing yet
+};
+
+/// Somebody who redeemed an invite that waits, and was not let in yet.
+struct WaitingFacts {
+  std::string id;  // of the pass
+  std::string display_name;
+  AccessRole role = AccessRole::kViewer;
+  std::int64_t since_unix_s = 0;
+  std::string invite_id, label;
 };
 
 /// What somebody did, or was refused.
@@ -62,6 +74,7 @@ class AccessBook {
   using UnixClock = std::function<std::int64_t()>;  // s
 
   struct Options {
+    bool waiting_room = false;    // every invite below the wearer's waits
     bool token_required = false;  // else who has no token may do what a wearer may
     UnixClock now_unix_s;         // null: the system's
     std::size_t max_invites = 10'000;
@@ -86,8 +99,13 @@ class AccessBook {
 
   /// InvalidArgument: the draft; ResourceExhausted: too many invites.
   void CreateInvite(InviteDraft draft, Done<Issued> done);
-  /// Unauthenticated: unknown, expired, revoked, or used up.
-  void Redeem(std::string token, Done<Issued> done);
+  /// Unauthenticated: unknown, expired, revoked, or used up. `display_name` is for whom lets people
+  /// in.
+  void Redeem(std::string token, Done<Issued> done, std::string display_name = "");
+  /// Who waits; who came first, first.
+  std::vector<WaitingFacts> Waiting() const;
+  /// Lets somebody in, or ends their pass. NotFound: nobody of that id waits.
+  void Admit(std::string id, bool refuse, Done<WaitingFacts> done);
   /// How many passes ended with it. NotFound: no such invite.
   void Revoke(std::string invite_id, Done<int> done);
   /// Newest first.

@@ -14,22 +14,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 constexpr int kKeptAudit = 100'000;        // rows
 constexpr std::size_t kPruneAfter = 1000;  // entries written
 constexpr const char* kTables = R"(
 CREATE TABLE invites(
   id TEXT PRIMARY KEY, secret_sha256 TEXT NOT NULL, role TEXT NOT NULL, label TEXT NOT NULL,
   created_unix_s INTEGER NOT NULL, expires_unix_s INTEGER NOT NULL, uses INTEGER NOT NULL,
-  used INTEGER NOT NULL, revoked INTEGER NOT NULL) STRICT;
+  used INTEGER NOT NULL, revoked INTEGER NOT NULL, waits INTEGER NOT NULL DEFAULT 0) STRICT;
 CREATE TABLE passes(
   id TEXT PRIMARY KEY, invite_id TEXT NOT NULL REFERENCES invites(id) ON DELETE CASCADE,
-  secret_sha256 TEXT NOT NULL) STRICT;
+  secret_sha256 TEXT NOT NULL, display_name TEXT NOT NULL DEFAULT '',
+  since_unix_s INTEGER NOT NULL DEFAULT 0, state INTEGER NOT NULL DEFAULT 0) STRICT;
 CREATE TABLE audit(
   number INTEGER PRIMARY KEY AUTOINCREMENT, unix_ms INTEGER NOT NULL, participant_id TEXT NOT NULL,
   display_name TEXT NOT NULL, access_id TEXT NOT NULL, invite_id TEXT NOT NULL, call TEXT NOT NULL,
   outcome TEXT NOT NULL) STRICT;
-PRAGMA user_version = 1;
+PRAGMA user_version = 2;
+)";
+// From version 1, which had no waiting room.
+constexpr const char* kFrom1 = R"(
+ALTER TABLE invites ADD COLUMN waits INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE passes ADD COLUMN display_name TEXT NOT NULL DEFAULT '';
+ALTER TABLE passes ADD COLUMN since_unix_s INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE passes ADD COLUMN state INTEGER NOT NULL DEFAULT 0;
+PRAGMA user_version = 2;
 )";
 
 absl::Status Prepare(SqliteDatabase& database, const fs::path& file) {
@@ -41,6 +50,9 @@ absl::Status Prepare(SqliteDatabase& database, const fs::path& file) {
   if (!version.ok()) return version.status();
   if (*version == "0") {
     return database.Execute(absl::StrCat("BEGIN IMMEDIATE;", kTables, "COMMIT").c_str());
+  }
+  if (*version == "1") {
+    return database.Execute(absl::StrCat("BEGIN IMMEDIATE;", kFrom1, "COMMIT").c_str());
   }
   if (*version == absl::StrCat(kVersion)) return absl::OkStatus();
   return absl::FailedPreconditionError(
@@ -59,6 +71,7 @@ InviteRow ReadInvite(const SqliteStatement& row) {
   invite.facts.uses = static_cast<int>(row.Int(6));
   invite.facts.used = static_cast<int>(row.Int(7));
   invite.facts.revoked = row.Int(8) != 0;
+  invite.facts.waits = row.Int(9) != 0;
   return invite;
 }
 
@@ -111,14 +124,15 @@ absl::Status AccessRows::Load(std::int64_t forget_before_unix_s, std::vector<Inv
     const absl::StatusOr<bool> row = rest->Step();
     if (!row.ok()) return row.status();
     if (!*row) return absl::OkStatus();
-    passes.push_back({rest->Text(0), rest->Text(1), rest->Text(2)});
+    passes.push_back({rest->Text(0), rest->Text(1), rest->Text(2), rest->Text(3), rest->Int(4),
+                      static_cast<PassState>(rest->Int(5))});
   }
 }
 
 absl::Status AccessRows::Write(const InviteRow& invite) {
   // No REPLACE: it would delete the row, and its passes with it.
   absl::StatusOr<SqliteStatement> statement = database_->Prepare(
-      "INSERT INTO invites VALUES(?,?,?,?,?,?,?,?,?) "
+      "INSERT INTO invites VALUES(?,?,?,?,?,?,?,?,?,?) "
       "ON CONFLICT(id) DO UPDATE SET used = excluded.used, revoked = excluded.revoked");
   if (!statement.ok()) return statement.status();
   const InviteFacts& facts = invite.facts;
@@ -132,16 +146,21 @@ absl::Status AccessRows::Write(const InviteRow& invite) {
   statement->Bind(6, static_cast<std::int64_t>(facts.uses));
   statement->Bind(7, static_cast<std::int64_t>(facts.used));
   statement->Bind(8, static_cast<std::int64_t>(facts.revoked ? 1 : 0));
+  statement->Bind(9, static_cast<std::int64_t>(facts.waits ? 1 : 0));
   return statement->Run();
 }
 
 absl::Status AccessRows::Write(const PassRow& pass) {
-  absl::StatusOr<SqliteStatement> statement =
-      database_->Prepare("INSERT INTO passes VALUES(?,?,?)");
+  absl::StatusOr<SqliteStatement> statement = database_->Prepare(
+      "INSERT INTO passes VALUES(?,?,?,?,?,?) "
+      "ON CONFLICT(id) DO UPDATE SET state = excluded.state");
   if (!statement.ok()) return statement.status();
   statement->Bind(0, std::string_view(pass.id));
   statement->Bind(1, std::string_view(pass.invite_id));
   statement->Bind(2, std::string_view(pass.secret_sha256));
+  statement->Bind(3, std::string_view(pass.display_name));
+  statement->Bind(4, pass.since_unix_s);
+  statement->Bind(5, static_cast<std::int64_t>(pass.state));
   return statement->Run();
 }
 
@@ -170,6 +189,7 @@ absl::Status AccessRows::InTransaction(WriteAll write_all) {
 }
 
 absl::Status AccessRows::Put(const InviteRow& invite) { return Write(invite); }
+absl::Status AccessRows::Put(const PassRow& pass) { return Write(pass); }
 
 absl::Status AccessRows::Put(const InviteRow& invite, const PassRow& pass) {
   return InTransaction([&] {

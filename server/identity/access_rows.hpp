@@ -18,8 +18,12 @@ struct InviteRow {
   InviteFacts facts;
   std::string secret_sha256;
 };
+enum class PassState { kIn = 0, kWaiting = 1, kRefused = 2 };  // as they are kept
 struct PassRow {
   std::string id, invite_id, secret_sha256;
+  std::string display_name;  // of the waiting room
+  std::int64_t since_unix_s = 0;
+  PassState state = PassState::kIn;
 };
 
 /// DIR/access.sqlite. One thread at a time.
@@ -34,7 +38,8 @@ class AccessRows {
   // On the disk when they return.
   absl::Status Put(const InviteRow& invite);
   absl::Status Put(const InviteRow& invite, const PassRow& pass);  // both or neither
-  absl::Status Put(const std::vector<AuditFacts>& entries);        // likewise
+  absl::Status Put(const PassRow& pass);
+  absl::Status Put(const std::vector<AuditFacts>& entries);  // likewise
 
   /// The newest `most`, oldest first.
   absl::StatusOr<std::vector<AuditFacts>> ReadAudit(int most);

@@ -14,6 +14,7 @@
 #include <ctime>
 #include <memory>
 
+#include "server/identity/name_constraints.hpp"
 #include "server/identity/openssl_owners.hpp"
 
 namespace saccade {
@@ -80,9 +81,39 @@ std::string AlternativeNames(const ServerNames& names) {
   return absl::StrJoin(all, ",");
 }
 
+bool MayName(const NAME_CONSTRAINTS* constraints, const ServerNames& one) {
+  const X509Owner probe(X509_new());
+  if (probe == nullptr ||
+      !AddExtension(probe.get(), probe.get(), NID_subject_alt_name, AlternativeNames(one))) {
+    return false;
+  }
+  // The check looks at what this has read of the extensions.
+  X509_check_purpose(probe.get(), -1, 0);
+  return NAME_CONSTRAINTS_check(probe.get(), const_cast<NAME_CONSTRAINTS*>(constraints)) ==
+         X509_V_OK;
+}
+
 }  // namespace
 
-absl::StatusOr<CertificateAndKey> MakeAuthority(const std::string& common_name) {
+ServerNames PermittedBy(const std::string& authority_pem, const ServerNames& names) {
+  const X509Owner authority = ReadCertificate(authority_pem);
+  if (authority == nullptr) return {};
+  const ConstraintsOwner constraints(static_cast<NAME_CONSTRAINTS*>(
+      X509_get_ext_d2i(authority.get(), NID_name_constraints, nullptr, nullptr)));
+  if (constraints == nullptr) return names;
+  ServerNames permitted;
+  for (const std::string& name : names.dns) {
+    if (MayName(constraints.get(), {{name}, {}})) permitted.dns.push_back(name);
+  }
+  for (const std::string& address : names.addresses) {
+    if (MayName(constraints.get(), {{}, {address}})) permitted.addresses.push_back(address);
+  }
+  ERR_clear_error();
+  return permitted;
+}
+
+absl::StatusOr<CertificateAndKey> MakeAuthority(const std::string& common_name,
+                                                const ServerNames& names) {
   const KeyOwner key(EVP_EC_gen("P-256"));
   if (key == nullptr) return Failed("making a key");
   // A common name has at most 64 bytes.
@@ -94,6 +125,8 @@ absl::StatusOr<CertificateAndKey> MakeAuthority(const std::string& common_name) 
       !AddExtension(own, own, NID_key_usage, "critical,keyCertSign,cRLSign") ||
       !AddExtension(own, own, NID_ext_key_usage, "serverAuth") ||
       !AddExtension(own, own, NID_subject_key_identifier, "hash") ||
+      (!names.All().empty() &&
+       !AddExtension(own, own, NID_name_constraints, NameConstraints(names))) ||
       X509_sign(own, key.get(), EVP_sha256()) == 0) {
     return Failed("signing the authority");
   }

@@ -24,10 +24,19 @@ struct ServerNames {
   static ServerNames OfThisMachine();
   /// One more: a host name or an IP literal (brackets allowed), unless it is there already.
   void Add(std::string host);
+  /// All of them, for people.
+  std::vector<std::string> All() const;
 };
 
-/// An authority of one's own: ECDSA P-256, self-signed, ten years, for servers only.
-absl::StatusOr<CertificateAndKey> MakeAuthority(const std::string& common_name);
+/// An authority of one's own: ECDSA P-256, self-signed, ten years, for servers only, and only for
+/// those called by `names` (name constraints, critical): its DNS names, also with ".local" behind
+/// them; its public addresses, of IPv6 the whole /64, as hosts change theirs daily; and any private
+/// address, so that the next network needs no new authority. Without names: for any name.
+absl::StatusOr<CertificateAndKey> MakeAuthority(const std::string& common_name,
+                                                const ServerNames& names = {});
+
+/// Of `names` those that this authority may vouch for.
+ServerNames PermittedBy(const std::string& authority_pem, const ServerNames& names);
 
 /// A server's certificate from it: ECDSA P-256, 397 days (what browsers accept at most).
 absl::StatusOr<CertificateAndKey> MakeServerCertificate(const CertificateAndKey& authority,

@@ -97,6 +97,12 @@ void ServerNames::Add(std::string host) {
   if (std::find(known.begin(), known.end(), host) == known.end()) known.push_back(std::move(host));
 }
 
+std::vector<std::string> ServerNames::All() const {
+  std::vector<std::string> all = dns;
+  all.insert(all.end(), addresses.begin(), addresses.end());
+  return all;
+}
+
 ServerNames ServerNames::OfThisMachine() {
   ServerNames names{{"localhost"}, {"127.0.0.1", "::1"}};
   std::array<char, 256> own{};

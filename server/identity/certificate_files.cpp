@@ -48,7 +48,16 @@ bool HasAll(const std::vector<std::string>& has, const std::vector<std::string>&
   });
 }
 
-absl::StatusOr<CertificateAndKey> Authority(const fs::path& directory, std::int64_t now_unix_s) {
+std::vector<std::string> LeftOut(const ServerNames& asked, const ServerNames& named) {
+  std::vector<std::string> left;
+  for (const std::string& name : asked.All()) {
+    if (!HasAll(named.All(), {name})) left.push_back(name);
+  }
+  return left;
+}
+
+absl::StatusOr<CertificateAndKey> Authority(const fs::path& directory, const ServerNames& names,
+                                            std::int64_t now_unix_s) {
   const fs::path certificate = directory / "authority.pem", key = directory / "authority.key";
   std::error_code ignored;
   if (fs::exists(certificate, ignored)) {
@@ -64,7 +73,7 @@ absl::StatusOr<CertificateAndKey> Authority(const fs::path& directory, std::int6
     if (facts.ok() && facts->not_after_unix_s > now_unix_s + kRenew_s) return kept;
   }
   absl::StatusOr<CertificateAndKey> made =
-      MakeAuthority(absl::StrCat("Saccade on ", ServerNames::OfThisMachine().dns.back()));
+      MakeAuthority(absl::StrCat("Saccade on ", ServerNames::OfThisMachine().dns.back()), names);
   if (!made.ok()) return made;
   if (absl::Status written = Write(directory, "authority", *made); !written.ok()) return written;
   Log(absl::StrCat("tls: made an authority of this server's own, ", certificate.string(),
@@ -89,14 +98,15 @@ std::string Lacking(const absl::StatusOr<CertificateAndKey>& kept, const std::st
 }  // namespace
 
 absl::StatusOr<ServerIdentity> EnsureServerIdentity(const fs::path& data_dir,
-                                                    const ServerNames& names,
+                                                    const ServerNames& asked,
                                                     std::int64_t now_unix_s) {
   if (absl::Status ready = PrepareDirectory(data_dir); !ready.ok()) return ready;
   const fs::path directory = data_dir / "tls";
   if (absl::Status ready = PrepareDirectory(directory); !ready.ok()) return ready;
   if (::chmod(directory.c_str(), 0700) != 0) return StoreFileError(directory, errno);
-  const absl::StatusOr<CertificateAndKey> authority = Authority(directory, now_unix_s);
+  const absl::StatusOr<CertificateAndKey> authority = Authority(directory, asked, now_unix_s);
   if (!authority.ok()) return authority.status();
+  const ServerNames names = PermittedBy(authority->certificate_pem, asked);
   absl::StatusOr<CertificateAndKey> server =
       Read(directory / "server.pem", directory / "server.key");
   const std::string why = Lacking(server, authority->certificate_pem, names, now_unix_s);
@@ -110,7 +120,7 @@ absl::StatusOr<ServerIdentity> EnsureServerIdentity(const fs::path& data_dir,
   const absl::StatusOr<CertificateFacts> root = InspectCertificate(authority->certificate_pem);
   if (!root.ok()) return root.status();
   return ServerIdentity{server->certificate_pem + authority->certificate_pem, server->key_pem,
-                        authority->certificate_pem, root->sha256};
+                        authority->certificate_pem, root->sha256, LeftOut(asked, names)};
 }
 
 absl::StatusOr<ServerIdentity> LoadServerIdentity(const fs::path& certificate, const fs::path& key,
@@ -129,7 +139,7 @@ absl::StatusOr<ServerIdentity> LoadServerIdentity(const fs::path& certificate, c
   const absl::StatusOr<CertificateFacts> facts = InspectCertificate(pair->certificate_pem);
   if (!facts.ok()) return bad(facts.status().message());
   if (facts->not_after_unix_s < now_unix_s) return bad("has expired; have a new one made");
-  return ServerIdentity{pair->certificate_pem, pair->key_pem, "", ""};
+  return ServerIdentity{pair->certificate_pem, pair->key_pem, "", "", {}};
 }
 
 }  // namespace saccade

@@ -17,12 +17,16 @@ struct ServerIdentity {
   /// Whom clients have to trust; empty where the certificate was given: then they do already.
   std::string root_pem;
   std::string root_sha256;  // its fingerprint, "AB:CD:..."
+  /// Of the names asked for those that the authority, which was made before, may not vouch for: by
+  /// them nobody can connect.
+  std::vector<std::string> not_named;
 };
 
 /// DIR/tls: authority.pem, authority.key, server.pem, server.key, for their owner alone (0600).
 /// What is missing is made; a server's certificate is made anew in the last thirty days of its
 /// life, or when `names` has one that it lacks. The authority stays as long as it is valid, so that
-/// who trusts it need not do so again. Says on stderr what it made.
+/// who trusts it need not do so again; it vouches for the names that it was made for, and for
+/// private addresses. Says on stderr what it made. To be asked again and again while serving.
 ///   PermissionDenied, ResourceExhausted  a file cannot be written
 ///   DataLoss                             a file of the authority is damaged
 absl::StatusOr<ServerIdentity> EnsureServerIdentity(const std::filesystem::path& directory,

@@ -15,12 +15,14 @@ struct OpenSslFree {
   void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
   void operator()(X509* certificate) const { X509_free(certificate); }
   void operator()(X509_EXTENSION* extension) const { X509_EXTENSION_free(extension); }
+  void operator()(NAME_CONSTRAINTS* constraints) const { NAME_CONSTRAINTS_free(constraints); }
   void operator()(GENERAL_NAMES* names) const { GENERAL_NAMES_free(names); }
 };
 using BioOwner = std::unique_ptr<BIO, OpenSslFree>;
 using KeyOwner = std::unique_ptr<EVP_PKEY, OpenSslFree>;
 using X509Owner = std::unique_ptr<X509, OpenSslFree>;
 using ExtensionOwner = std::unique_ptr<X509_EXTENSION, OpenSslFree>;
+using ConstraintsOwner = std::unique_ptr<NAME_CONSTRAINTS, OpenSslFree>;
 using NamesOwner = std::unique_ptr<GENERAL_NAMES, OpenSslFree>;
 
 /// The first of a PEM text; null if there is none.

@@ -14,6 +14,8 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"AccessService/ListInvites", kOwner},
     {"AccessService/RevokeInvite", kOwner},
     {"AccessService/ListAudit", kOwner},
+    {"AccessService/ListWaiting", kWearer},  // whose eyes and ears it is
+    {"AccessService/Admit", kWearer},
 
     {"SessionService/Join", kViewer},
     {"SessionService/Subscribe", kViewer},
@@ -48,6 +50,9 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"GazeService/CalibrateMount", kPilot},
     {"GazeService/Override", kWearer},
     {"GazeService/Pause", kWearer},
+
+    {"Health/Check", kAnyone},  // load balancers have no token
+    {"Health/Watch", kViewer},
 
     // The gateway. The page's files hold nothing of the wearable; what it shows comes by the calls
     // above.

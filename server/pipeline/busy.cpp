@@ -1,6 +1,8 @@
 #include "server/pipeline/busy.hpp"
 
 #include <absl/strings/cord.h>
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
@@ -9,6 +11,7 @@ namespace saccade {
 namespace {
 
 constexpr char kRetryInfo[] = "type.googleapis.com/google.rpc.RetryInfo";
+constexpr char kRetryAfter[] = "saccade/retry_after_ns";  // the same for ourselves
 constexpr Timestamp kSecond = 1'000'000'000;
 
 void AppendVarint(std::uint64_t value, std::string& out) {
@@ -38,8 +41,15 @@ absl::Status BusyError(absl::string_view message, Timestamp retry_after_ns) {
   const Timestamp after_ns = std::max<Timestamp>(retry_after_ns, 1'000'000);
   absl::Status status = absl::ResourceExhaustedError(
       absl::StrFormat("%s: try again in %.1f s", message, std::max(0.1, Seconds(after_ns))));
+  status.SetPayload(kRetryAfter, absl::Cord(absl::StrCat(after_ns)));
   status.SetPayload(kRetryInfo, absl::Cord(EncodeRetryInfo(after_ns)));
   return status;
+}
+
+Timestamp RetryAfterOf(const absl::Status& status) {
+  const auto payload = status.GetPayload(kRetryAfter);
+  Timestamp after_ns = 0;
+  return payload && absl::SimpleAtoi(std::string(*payload), &after_ns) ? after_ns : 0;
 }
 
 std::optional<std::string> RetryInfoOf(const absl::Status& status) {

@@ -15,5 +15,7 @@ absl::Status BusyError(absl::string_view message, Timestamp retry_after_ns);
 
 /// The google.rpc.RetryInfo of such a status, encoded; nothing in any other.
 std::optional<std::string> RetryInfoOf(const absl::Status& status);
+/// When to try again [ns from when it was made]; 0 of any other.
+Timestamp RetryAfterOf(const absl::Status& status);
 
 }  // namespace saccade

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "server/rpc/early_handler.hpp"
 #include "server/rpc/unary_call.hpp"
 #include "shared/wire/from_proto.hpp"
 
@@ -46,6 +47,16 @@ void Fill(const InviteFacts& facts, v1::Invite& invite) {
   invite.set_used(static_cast<std::uint32_t>(facts.used));
   invite.set_revoked(facts.revoked);
   invite.set_label(facts.label);
+  invite.set_waiting_room(facts.waits);
+}
+
+void Fill(const WaitingFacts& facts, v1::WaitingPerson& person) {
+  person.set_id(facts.id);
+  person.set_display_name(facts.display_name);
+  person.set_role(ToProto(facts.role));
+  person.set_since_unix_s(facts.since_unix_s);
+  person.set_invite_id(facts.invite_id);
+  person.set_label(facts.label);
 }
 
 void Fill(const AuditFacts& facts, v1::AuditEntry& entry) {
@@ -72,11 +83,29 @@ absl::StatusOr<InviteDraft> FromProto(const v1::CreateInviteRequest& request) {
   absl::Status label = wire::CheckText(request.label(), wire::kMaxNameBytes, "label");
   if (!label.ok()) return label;
   draft.label = request.label();
+  draft.waits = request.waiting_room();
   if (absl::Status valid = draft.Validate(); !valid.ok()) return valid;
   return draft;
 }
 
 }  // namespace
+
+AccessService::AccessService(AccessBook& book, Gatekeeper& gate, MakeLink make_link, bool insecure)
+    : book_(book), gate_(gate), make_link_(std::move(make_link)), insecure_(insecure) {
+  // By their numbers in the proto; limits_test calls every one.
+  MarkMethodCallback(0, Early(gate, "AccessService/GetAccess", this, &AccessService::GetAccess));
+  MarkMethodCallback(1, Early(gate, "AccessService/Redeem", this, &AccessService::Redeem));
+  MarkMethodCallback(2,
+                     Early(gate, "AccessService/CreateInvite", this, &AccessService::CreateInvite));
+  MarkMethodCallback(3,
+                     Early(gate, "AccessService/ListInvites", this, &AccessService::ListInvites));
+  MarkMethodCallback(4,
+                     Early(gate, "AccessService/RevokeInvite", this, &AccessService::RevokeInvite));
+  MarkMethodCallback(5,
+                     Early(gate, "AccessService/ListWaiting", this, &AccessService::ListWaiting));
+  MarkMethodCallback(6, Early(gate, "AccessService/Admit", this, &AccessService::Admit));
+  MarkMethodCallback(7, Early(gate, "AccessService/ListAudit", this, &AccessService::ListAudit));
+}
 
 grpc::ServerUnaryReactor* AccessService::GetAccess(Context* context,
                                                    const v1::GetAccessRequest* /*request*/,
@@ -87,8 +116,9 @@ grpc::ServerUnaryReactor* AccessService::GetAccess(Context* context,
   }
   response->set_token_required(book_.token_required());
   response->set_insecure(insecure_);
-  const absl::StatusOr<Access> access = book_.Check(TokenOf(*context));
+  const absl::StatusOr<Access> access = gate_.Who(*context);
   if (access.ok()) {
+    response->set_waiting(access->waiting);
     response->set_role(ToProto(access->role));
     response->set_expires_unix_s(access->expires_unix_s);
   } else {
@@ -103,11 +133,16 @@ grpc::ServerUnaryReactor* AccessService::Redeem(Context* context, const v1::Rede
   if (const auto entered = call.Enter(gate_, Toll::kRedeem); !entered.ok()) {
     return call.Finish(entered.status());
   }
-  book_.Redeem(request->invite(), call.Answer<Issued>([response](const Issued& issued) {
+  if (absl::Status name = CheckDisplayName(request->display_name()); !name.ok()) {
+    return call.Finish(name);
+  }
+  const auto fill = [response](const Issued& issued) {
     response->set_token(issued.token);
     response->set_role(ToProto(issued.invite.role));
     response->set_expires_unix_s(issued.invite.expires_unix_s);
-  }));
+    response->set_waiting(issued.waiting);
+  };
+  book_.Redeem(request->invite(), call.Answer<Issued>(fill), request->display_name());
   return call.reactor();
 }
 
@@ -149,6 +184,31 @@ grpc::ServerUnaryReactor* AccessService::RevokeInvite(Context* context,
   book_.Revoke(request->id(), call.Answer<int>([response](int passes) {
     response->set_passes(static_cast<std::uint32_t>(passes));
   }));
+  return call.reactor();
+}
+
+grpc::ServerUnaryReactor* AccessService::ListWaiting(Context* context,
+                                                     const v1::ListWaitingRequest* /*request*/,
+                                                     v1::ListWaitingResponse* response) {
+  // A wearer's page asks all the time.
+  UnaryCall call(*context, "AccessService/ListWaiting", UnaryCall::Log::kNothing);
+  if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
+    return call.Finish(entered.status());
+  }
+  for (const WaitingFacts& facts : book_.Waiting()) Fill(facts, *response->add_people());
+  return call.Finish(absl::OkStatus());
+}
+
+grpc::ServerUnaryReactor* AccessService::Admit(Context* context, const v1::AdmitRequest* request,
+                                               v1::AdmitResponse* response) {
+  UnaryCall call(*context, "AccessService/Admit", UnaryCall::Log::kAll);
+  if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
+    return call.Finish(entered.status());
+  }
+  book_.Admit(request->id(), request->refuse(),
+              call.Answer<WaitingFacts>([response](const WaitingFacts& facts) {
+                Fill(facts, *response->mutable_person());
+              }));
   return call.reactor();
 }
 

@@ -15,8 +15,7 @@ class AccessService final : public v1::AccessService::CallbackService {
  public:
   using MakeLink = std::function<std::string(AccessRole, const std::string& token)>;
   /// `make_link` may be null: then links are "#invite=TOKEN" alone.
-  AccessService(AccessBook& book, Gatekeeper& gate, MakeLink make_link, bool insecure)
-      : book_(book), gate_(gate), make_link_(std::move(make_link)), insecure_(insecure) {}
+  AccessService(AccessBook& book, Gatekeeper& gate, MakeLink make_link, bool insecure);
 
  private:
   using Context = grpc::CallbackServerContext;
@@ -32,6 +31,10 @@ class AccessService final : public v1::AccessService::CallbackService {
                        v1::ListInvitesResponse* response) override;
   Reactor* RevokeInvite(Context* context, const v1::RevokeInviteRequest* request,
                         v1::RevokeInviteResponse* response) override;
+  Reactor* ListWaiting(Context* context, const v1::ListWaitingRequest* request,
+                       v1::ListWaitingResponse* response) override;
+  Reactor* Admit(Context* context, const v1::AdmitRequest* request,
+                 v1::AdmitResponse* response) override;
   Reactor* ListAudit(Context* context, const v1::ListAuditRequest* request,
                      v1::ListAuditResponse* response) override;
 

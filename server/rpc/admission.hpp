@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "server/rpc/rate_limiter.hpp"
+#include "server/pipeline/rate_limiter.hpp"
 
 namespace saccade {
 

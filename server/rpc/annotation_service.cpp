@@ -1,6 +1,7 @@
 #include "server/rpc/annotation_service.hpp"
 
 #include "server/rpc/annotation_pages.hpp"
+#include "server/rpc/early_handler.hpp"
 #include "server/rpc/unary_call.hpp"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/to_proto.hpp"
@@ -44,6 +45,17 @@ Done<Annotation> AnswerWithAnnotation(const UnaryCall& call, Response* response)
 }
 
 }  // namespace
+
+AnnotationService::AnnotationService(Backend& backend, Gatekeeper& gate)
+    : backend_(backend), gate_(gate) {
+  // By their numbers in the proto; limits_test calls every one.
+  MarkMethodCallback(0, Early(gate, "AnnotationService/Create", this, &AnnotationService::Create));
+  MarkMethodCallback(1, Early(gate, "AnnotationService/Update", this, &AnnotationService::Update));
+  MarkMethodCallback(2, Early(gate, "AnnotationService/Delete", this, &AnnotationService::Delete));
+  MarkMethodCallback(3, Early(gate, "AnnotationService/List", this, &AnnotationService::List));
+  MarkMethodCallback(4, Early(gate, "AnnotationService/Undo", this, &AnnotationService::Undo));
+  MarkMethodCallback(5, Early(gate, "AnnotationService/Redo", this, &AnnotationService::Redo));
+}
 
 template <typename Request, typename Make>
 grpc::ServerUnaryReactor* AnnotationService::Edit(grpc::CallbackServerContext* context,

@@ -10,7 +10,7 @@ namespace saccade {
 /// the store's commit. Handlers run on gRPC's threads and never block.
 class AnnotationService final : public v1::AnnotationService::CallbackService {
  public:
-  AnnotationService(Backend& backend, Gatekeeper& gate) : backend_(backend), gate_(gate) {}
+  AnnotationService(Backend& backend, Gatekeeper& gate);
 
  private:
   grpc::ServerUnaryReactor* Create(grpc::CallbackServerContext* context,

@@ -1,64 +1,91 @@
 #include "server/rpc/gatekeeper.hpp"
 
-#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 #include <absl/strings/str_replace.h>
-#include <absl/strings/str_split.h>
-#include <arpa/inet.h>
-
-#include <array>
+#include <grpc/grpc_security_constants.h>
+#include <grpcpp/security/auth_context.h>
 
 #include "server/identity/role_table.hpp"
+#include "server/pipeline/peer_address.hpp"
 
 namespace saccade {
 namespace {
 
 // The gateway's name for it (server/gateway/upstream_call.hpp), believed only in process.
 constexpr char kPeerMetadata[] = "x-saccade-peer";
-constexpr absl::string_view kBearer = "bearer ";
 
-std::string Address(const std::string& address) {
-  std::array<unsigned char, 16> bytes{};
-  if (inet_pton(AF_INET6, address.c_str(), bytes.data()) != 1) {
-    return absl::StrCat("ipv4:", address);
-  }
-  std::string network = "ipv6:";
-  for (std::size_t i = 0; i < 8; ++i)
-    absl::StrAppend(&network, absl::Hex(bytes[i], absl::kZeroPad2));
-  return network;
+std::string Metadata(const grpc::CallbackServerContext& context, const char* name) {
+  const auto at = context.client_metadata().find(name);
+  if (at == context.client_metadata().end()) return "";
+  return {at->second.data(), at->second.size()};
 }
 
-}  // namespace
-
-std::string PeerOf(const grpc::CallbackServerContext& context) {
-  const std::string peer = context.peer();
-  if (absl::StartsWith(peer, "inproc")) {
-    const auto& metadata = context.client_metadata();
-    const auto at = metadata.find(kPeerMetadata);
-    if (at == metadata.end()) return "inproc";
-    return Address(std::string(at->second.data(), at->second.size()));
-  }
-  // "ipv4:127.0.0.1:50123", "ipv6:%5B::1%5D:50123", "unix:..."
+// "ipv4:127.0.0.1:50123", "ipv6:%5B::1%5D:50123", "unix:..."
+std::string SocketPeer(const std::string& peer) {
   const std::string plain = absl::StrReplaceAll(peer, {{"%5B", "["}, {"%5D", "]"}});
   const std::size_t port = plain.rfind(':');
-  if (absl::StartsWith(plain, "ipv4:") && port > 5) return Address(plain.substr(5, port - 5));
+  if (absl::StartsWith(plain, "ipv4:") && port > 5) return PeerKey(plain.substr(5, port - 5));
   const std::size_t open = plain.find('['), close = plain.find(']');
   if (absl::StartsWith(plain, "ipv6:") && open != std::string::npos && close > open) {
-    return Address(plain.substr(open + 1, close - open - 1));
+    return PeerKey(plain.substr(open + 1, close - open - 1));
   }
   return plain;
 }
+
+std::string IdOf(const absl::StatusOr<Access>& access) { return access.ok() ? access->id : ""; }
+
+bool IsInProcess(const grpc::CallbackServerContext& context) {
+  return absl::StartsWith(context.peer(), "inproc");
+}
+
+}  // namespace
 
 absl::string_view TokenOf(const grpc::CallbackServerContext& context) {
   const auto& metadata = context.client_metadata();
   const auto at = metadata.find("authorization");
   if (at == metadata.end()) return {};
-  absl::string_view value(at->second.data(), at->second.size());
-  if (!absl::StartsWithIgnoreCase(value, kBearer))
-    return value;  // no token of ours, and so refused
-  return absl::StripAsciiWhitespace(value.substr(kBearer.size()));
+  return TokenIn({at->second.data(), at->second.size()});
+}
+
+std::string Gatekeeper::PeerOf(const Context& context) const {
+  if (IsInProcess(context)) {
+    const std::string address = Metadata(context, kPeerMetadata);
+    return address.empty() ? "inproc" : PeerKey(address);
+  }
+  std::string peer = SocketPeer(context.peer());
+  if (trusted_proxy_.empty() || peer != trusted_proxy_) return peer;
+  const std::string address = ForwardedFor(Metadata(context, "x-forwarded-for"));
+  return address.empty() ? peer : PeerKey(address);
+}
+
+absl::Status Gatekeeper::Arrive(const Context& context, std::size_t bytes) {
+  if (IsInProcess(context)) return absl::OkStatus();
+  return traffic_.Admit(PeerOf(context), IdOf(Who(context)), bytes, MonotonicNow());
+}
+
+absl::Status Gatekeeper::AdmitBrowser(absl::string_view address, absl::string_view authorization,
+                                      std::size_t bytes) {
+  return traffic_.Admit(PeerKey(address), IdOf(access_.Check(TokenIn(authorization))), bytes,
+                        MonotonicNow());
+}
+
+absl::StatusOr<Access> Gatekeeper::Who(const Context& context) const {
+  const absl::string_view token = TokenOf(context);
+  if (!token.empty() || !access_.token_required()) return access_.Check(token);
+  const std::shared_ptr<const grpc::AuthContext> shown = context.auth_context();
+  if (shown == nullptr || !shown->IsPeerAuthenticated()) return access_.Check(token);
+  Access machine{"", AccessRole::kViewer, 0};
+  for (const char* kind : {GRPC_PEER_URI_PROPERTY_NAME, GRPC_X509_CN_PROPERTY_NAME}) {
+    for (const grpc::string_ref& value : shown->FindPropertyValues(kind)) {
+      const std::string name(value.data(), value.size());
+      if (machine.id.empty()) machine.id = absl::StrCat("machine:", name);
+      const auto role = machines_.find(name);
+      if (role == machines_.end()) continue;
+      return Access{absl::StrCat("machine:", name), role->second, 0};
+    }
+  }
+  return machine.id.empty() ? access_.Check(token) : machine;
 }
 
 absl::StatusOr<Access> Gatekeeper::Check(const Context& context, Method method) const {
@@ -67,8 +94,12 @@ absl::StatusOr<Access> Gatekeeper::Check(const Context& context, Method method) 
     return absl::PermissionDeniedError(
         absl::StrCat("access: ", method, " is not in the table of roles, so nobody may call it"));
   }
-  absl::StatusOr<Access> access = access_.Check(TokenOf(context));
+  absl::StatusOr<Access> access = Who(context);
   if (*least == AccessRole::kAnyone) return access.ok() ? access : Access{"", *least, 0};
+  if (access.ok() && access->waiting) {
+    return absl::PermissionDeniedError(
+        "access: you wait to be let in; the wearer, or who started the server, decides");
+  }
   if (!access.ok() || access->role >= *least) return access;
   return absl::PermissionDeniedError(absl::StrCat("access: this takes the role ", Word(*least),
                                                   ", and yours is ", Word(access->role),

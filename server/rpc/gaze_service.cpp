@@ -1,5 +1,6 @@
 #include "server/rpc/gaze_service.hpp"
 
+#include "server/rpc/early_handler.hpp"
 #include "server/rpc/unary_call.hpp"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/gaze.hpp"
@@ -22,6 +23,24 @@ Done<std::shared_ptr<const GazeSnapshot>> AnswerWithState(const UnaryCall& call,
 }
 
 }  // namespace
+
+GazeService::GazeService(Backend& backend, Gatekeeper& gate) : backend_(backend), gate_(gate) {
+  // By their numbers in the proto; limits_test calls every one.
+  MarkMethodCallback(0, Early(gate, "GazeService/GetState", this, &GazeService::GetState));
+  MarkMethodCallback(1, Early(gate, "GazeService/AcquireLease", this, &GazeService::AcquireLease));
+  MarkMethodCallback(2, Early(gate, "GazeService/ReleaseLease", this, &GazeService::ReleaseLease));
+  MarkMethodCallback(3, Early(gate, "GazeService/Fixate", this, &GazeService::Fixate));
+  MarkMethodCallback(4, Early(gate, "GazeService/StopFixating", this, &GazeService::StopFixating));
+  MarkMethodCallback(5, Early(gate, "GazeService/Home", this, &GazeService::Home));
+  MarkMethodCallback(6, Early(gate, "GazeService/KeepHorizon", this, &GazeService::KeepHorizon));
+  MarkMethodCallback(7, Early(gate, "GazeService/Explore", this, &GazeService::Explore));
+  MarkMethodCallback(8,
+                     Early(gate, "GazeService/CalibrateMount", this, &GazeService::CalibrateMount));
+  MarkMethodCallback(
+      9, Early(gate, "GazeService/GetMountCalibration", this, &GazeService::GetMountCalibration));
+  MarkMethodCallback(10, Early(gate, "GazeService/Override", this, &GazeService::Override));
+  MarkMethodCallback(11, Early(gate, "GazeService/Pause", this, &GazeService::Pause));
+}
 
 template <typename Request, typename Make>
 grpc::ServerUnaryReactor* GazeService::Order(Context* context, const Request* request,

@@ -10,7 +10,7 @@ namespace saccade {
 /// threads and never block.
 class GazeService final : public v1::GazeService::CallbackService {
  public:
-  GazeService(Backend& backend, Gatekeeper& gate) : backend_(backend), gate_(gate) {}
+  GazeService(Backend& backend, Gatekeeper& gate);
 
  private:
   using Context = grpc::CallbackServerContext;

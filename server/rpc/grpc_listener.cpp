@@ -2,24 +2,31 @@
 
 #include <absl/cleanup/cleanup.h>
 #include <absl/strings/str_cat.h>
+#include <arpa/inet.h>
+#include <linux/tcp.h>
 #include <netdb.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 
 #include "server/pipeline/descriptors.hpp"
+#include "server/pipeline/peer_address.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr int kBacklog = 512;
 constexpr int kRetryMs = 100;
+constexpr Timestamp kHandshake_ns = 10'000'000'000;  // as rpc_server.cpp limits it
+constexpr Timestamp kSay_ns = 1'000'000'000;         // a line of the log at most so often
 
 int PortOf(int socket) {
   sockaddr_storage address{};
@@ -29,6 +36,30 @@ int PortOf(int socket) {
     return ntohs(reinterpret_cast<const sockaddr_in6&>(address).sin6_port);
   }
   return ntohs(reinterpret_cast<const sockaddr_in&>(address).sin_port);
+}
+
+std::string AddressText(const sockaddr_storage& address) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const void* bytes = &reinterpret_cast<const sockaddr_in&>(address).sin_addr;
+  if (address.ss_family == AF_INET6) {
+    bytes = &reinterpret_cast<const sockaddr_in6&>(address).sin6_addr;
+  }
+  return inet_ntop(address.ss_family, bytes, text.data(), text.size()) == nullptr ? ""
+                                                                                  : text.data();
+}
+
+/// 0: there is none.
+std::uint64_t SocketNumber(int fd) {
+  struct stat facts {};
+  return ::fstat(fd, &facts) == 0 && S_ISSOCK(facts.st_mode) ? facts.st_ino : 0;
+}
+
+/// With data, as TCP counts them.
+unsigned SegmentsFrom(int fd) {
+  tcp_info info{};
+  socklen_t size = sizeof(info);
+  if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return 0;
+  return info.tcpi_data_segs_in;
 }
 
 /// A listening socket, or -1 with errno.
@@ -48,8 +79,8 @@ int ListenAt(const addrinfo& address) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<GrpcListener>> GrpcListener::Bind(const std::string& host,
-                                                                 int port) {
+absl::StatusOr<std::unique_ptr<GrpcListener>> GrpcListener::Bind(const std::string& host, int port,
+                                                                 const ConnectionLimits& limits) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
@@ -64,7 +95,7 @@ absl::StatusOr<std::unique_ptr<GrpcListener>> GrpcListener::Bind(const std::stri
     ::close(socket);
     return absl::UnavailableError(std::strerror(errno));
   }
-  return std::unique_ptr<GrpcListener>(new GrpcListener(socket, wake, PortOf(socket)));
+  return std::unique_ptr<GrpcListener>(new GrpcListener(socket, wake, PortOf(socket), limits));
 }
 
 GrpcListener::~GrpcListener() {
@@ -88,9 +119,13 @@ void GrpcListener::Stop() {
 
 // False: nothing to accept now, or no means to.
 bool GrpcListener::AcceptOne() {
-  const int fd = ::accept4(socket_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  sockaddr_storage address{};
+  socklen_t size = sizeof(address);
+  const int fd = ::accept4(socket_, reinterpret_cast<sockaddr*>(&address), &size,
+                           SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (fd < 0) return errno == EINTR || errno == ECONNABORTED;
-  if (DescriptorsRunOut(fd)) {
+  const std::string peer = PeerKey(AddressText(address));
+  if (DescriptorsRunOut(fd) || !Welcome(fd, peer)) {
     ::close(fd);
     return true;
   }
@@ -100,8 +135,43 @@ bool GrpcListener::AcceptOne() {
   Acceptor::NewConnectionParameters connection;
   connection.listener_fd = socket_;
   connection.fd = fd;
+  open_.push_back({fd, SocketNumber(fd), peer, MonotonicNow()});
   acceptor_->HandleNewConnection(&connection);
   return true;
+}
+
+bool GrpcListener::Welcome(int fd, const std::string& peer) {
+  const Timestamp now_ns = MonotonicNow();
+  absl::Status status = gate_.Hurry(peer, now_ns);
+  if (status.ok()) {
+    std::erase_if(open_,
+                  [fd](const Open& one) { return one.fd == fd; });  // the system gave it anew
+    const ConnectionCounts counts = Count(peer, now_ns);
+    status = gate_.Admit(peer, counts);
+    if (status.ok() && counts.all >= limits_.all) {
+      status = absl::ResourceExhaustedError(
+          absl::StrCat("connections: ", counts.all, " are open, as many as may be"));
+    }
+  }
+  if (!status.ok() && now_ns - said_ns_ > kSay_ns) {
+    said_ns_ = now_ns;
+    Log(absl::StrCat("grpc: ", peer, " was turned away: ", status.message()));
+  }
+  return status.ok();
+}
+
+ConnectionCounts GrpcListener::Count(const std::string& peer, Timestamp now_ns) {
+  std::erase_if(open_, [](const Open& one) { return SocketNumber(one.fd) != one.socket; });
+  ConnectionCounts counts;
+  counts.all = static_cast<int>(open_.size());
+  for (const Open& one : open_) {
+    if (one.peer != peer) continue;
+    ++counts.of_address;
+    // A handshake takes two messages of the caller's; who never sends them is closed by gRPC.
+    const bool young = now_ns - one.accepted_ns < kHandshake_ns;
+    if (young && SegmentsFrom(one.fd) < 2) ++counts.unheard_of_address;
+  }
+  return counts;
 }
 
 void GrpcListener::Run() {

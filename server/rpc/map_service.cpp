@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/rpc/deltas.hpp"
+#include "server/rpc/early_handler.hpp"
 #include "server/rpc/unary_call.hpp"
 
 namespace saccade {
@@ -43,6 +44,17 @@ absl::Status NoMapYet() {
 }
 
 }  // namespace
+
+MapService::MapService(Backend& backend, StreamHub& hub, Gatekeeper& gate)
+    : backend_(backend), hub_(hub), gate_(gate) {
+  // By their numbers in the proto; limits_test calls every one.
+  MarkMethodCallback(0, Early(gate, "MapService/Get", this, &MapService::Get));
+  MarkMethodCallback(1, Early(gate, "MapService/Reset", this, &MapService::Reset));
+  MarkMethodCallback(2, Early(gate, "MapService/Export", this, &MapService::Export));
+  MarkMethodCallback(3, Early(gate, "MapService/Save", this, &MapService::Save));
+  MarkMethodCallback(4, Early(gate, "MapService/Load", this, &MapService::Load));
+  MarkMethodCallback(5, Early(gate, "MapService/List", this, &MapService::List));
+}
 
 grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
                                           const v1::GetMapRequest* /*request*/,

@@ -11,8 +11,7 @@ namespace saccade {
 /// Handlers never block.
 class MapService final : public v1::MapService::CallbackService {
  public:
-  MapService(Backend& backend, StreamHub& hub, Gatekeeper& gate)
-      : backend_(backend), hub_(hub), gate_(gate) {}
+  MapService(Backend& backend, StreamHub& hub, Gatekeeper& gate);
 
  private:
   grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context,

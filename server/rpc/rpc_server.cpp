@@ -3,12 +3,15 @@
 #include <absl/strings/str_cat.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
+#include <grpcpp/security/server_credentials.h>
 
 #include "server/rpc/access_service.hpp"
 #include "server/rpc/annotation_service.hpp"
 #include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/gaze_service.hpp"
 #include "server/rpc/grpc_listener.hpp"
+#include "server/rpc/health_service.hpp"
+#include "server/rpc/live_pem.hpp"
 #include "server/rpc/map_service.hpp"
 #include "server/rpc/session_service.hpp"
 
@@ -39,12 +42,33 @@ void SetArguments(const RpcServerOptions& options, grpc::ServerBuilder& builder)
   builder.SetResourceQuota(grpc::ResourceQuota("rpc").SetMaxThreads(options.max_threads));
 }
 
-std::shared_ptr<grpc::ServerCredentials> CredentialsOf(const RpcServerOptions& options) {
-  if (!options.tls) return grpc::InsecureServerCredentials();
-  grpc::SslServerCredentialsOptions tls;  // of clients no certificate is asked
-  tls.pem_key_cert_pairs.push_back({options.tls->key_pem, options.tls->chain_pem});
-  return grpc::SslServerCredentials(tls);
+constexpr unsigned kLookForTls_s = 2;
+
+// `pem` holds key and certificates in one, so that they change together.
+std::shared_ptr<grpc::ServerCredentials> CredentialsOf(const LivePem* pem,
+                                                       const LivePem* client_ca) {
+  if (pem == nullptr) return grpc::InsecureServerCredentials();
+  namespace tls = grpc::experimental;
+  tls::TlsServerCredentialsOptions options(std::make_shared<tls::FileWatcherCertificateProvider>(
+      pem->path(), pem->path(), client_ca == nullptr ? "" : client_ca->path(), kLookForTls_s));
+  options.watch_identity_key_cert_pairs();
+  if (client_ca != nullptr) {  // who shows none needs a token
+    options.watch_root_certs();
+    options.set_cert_request_type(GRPC_SSL_REQUEST_CLIENT_CERTIFICATE_AND_VERIFY);
+  }
+  return tls::TlsServerCredentials(options);
 }
+
+/// Who links the library has reflection on every server: here on none that asks for tokens, as it
+/// asks nobody for one.
+class NoReflection final : public grpc::ServerBuilderOption {
+  void UpdateArguments(grpc::ChannelArguments*) override {}
+  void UpdatePlugins(std::vector<std::unique_ptr<grpc::ServerBuilderPlugin>>* plugins) override {
+    std::erase_if(*plugins, [](const std::unique_ptr<grpc::ServerBuilderPlugin>& plugin) {
+      return plugin->name() == "proto_server_reflection";
+    });
+  }
+};
 
 }  // namespace
 
@@ -57,7 +81,9 @@ class RpcServer::Impl {
             [&backend](const std::string& id) { return backend.Submit(ForgetSession{id}).ok(); }),
         own_access_(options.access == nullptr ? AccessBook::InMemory({}) : nullptr),
         access_(options.access == nullptr ? *own_access_ : *options.access),
-        gate_(sessions_, access_, options.limits),
+        gate_(sessions_, access_,
+              {options.limits, options.traffic, options.machines, options.trusted_proxy}),
+        health_service_(gate_),
         access_service_(access_, gate_, options.make_link, options.insecure),
         session_service_(backend, hub, gate_),
         annotation_service_(backend, gate_),
@@ -74,21 +100,33 @@ class RpcServer::Impl {
   }
 
   absl::Status Start(const RpcServerOptions& options) {
-    grpc::EnableDefaultHealthCheckService(true);
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    grpc::EnableDefaultHealthCheckService(false);  // it would answer anybody: HealthService
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();  // by hand, so that it is linked
     grpc::ServerBuilder builder;
     SetArguments(options, builder);
+    if (access_.token_required()) builder.SetOption(std::make_unique<NoReflection>());
     absl::StatusOr<std::unique_ptr<GrpcListener>> listener =
-        GrpcListener::Bind(options.host, options.port);
+        GrpcListener::Bind(options.host, options.port, options.connections);
     if (!listener.ok()) {
       return absl::UnavailableError(absl::StrCat("grpc: cannot listen on ", options.host, " port ",
                                                  options.port, ": ", listener.status().message(),
                                                  "; choose another with --grpc"));
     }
+    if (options.tls) {
+      absl::StatusOr<std::unique_ptr<LivePem>> pem = LivePem::Make(Joined(*options.tls));
+      if (!pem.ok()) return pem.status();
+      pem_ = *std::move(pem);
+    }
+    if (options.tls && !options.client_ca_pem.empty()) {
+      absl::StatusOr<std::unique_ptr<LivePem>> pem = LivePem::Make(options.client_ca_pem);
+      if (!pem.ok()) return pem.status();
+      client_ca_ = *std::move(pem);
+    }
     std::unique_ptr<GrpcListener::Acceptor> acceptor =
         builder.experimental().AddExternalConnectionAcceptor(
             grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-            CredentialsOf(options));
+            CredentialsOf(pem_.get(), client_ca_.get()));
+    builder.RegisterService(&health_service_);
     builder.RegisterService(&access_service_);
     builder.RegisterService(&session_service_);
     builder.RegisterService(&annotation_service_);
@@ -105,28 +143,38 @@ class RpcServer::Impl {
     if (server_ == nullptr) return;
     listener_->Stop();
     hub_.CloseAll(absl::UnavailableError("the server is shutting down"));
+    health_service_.Stop();
     server_->Shutdown(std::chrono::system_clock::now() + grace);
     server_->Wait();
     server_ = nullptr;
   }
 
   int port() const { return listener_->port(); }
+  Gatekeeper& gate() { return gate_; }
+  absl::Status SetTls(const TlsPair& tls) {
+    if (pem_ == nullptr) return absl::FailedPreconditionError("tls: this port is plain");
+    return pem_->Set(Joined(tls));
+  }
   std::shared_ptr<grpc::Channel> InProcessChannel() {
     return server_->InProcessChannel(grpc::ChannelArguments());
   }
 
  private:
+  static std::string Joined(const TlsPair& tls) { return tls.key_pem + tls.chain_pem; }
+
   StreamHub& hub_;
   SessionTable sessions_;
   const std::unique_ptr<AccessBook> own_access_;
   AccessBook& access_;
   Gatekeeper gate_;
+  HealthService health_service_;
   AccessService access_service_;
   SessionService session_service_;
   AnnotationService annotation_service_;
   MapService map_service_;
   GazeService gaze_service_;
-  std::unique_ptr<GrpcListener> listener_;  // outlives the server, to which its acceptor belongs
+  std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
+  std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs
   std::unique_ptr<grpc::Server> server_;
 };
 
@@ -141,6 +189,11 @@ absl::StatusOr<std::unique_ptr<RpcServer>> RpcServer::Start(const RpcServerOptio
 }
 
 int RpcServer::port() const { return impl_->port(); }
+absl::Status RpcServer::AdmitBrowser(absl::string_view address, absl::string_view authorization,
+                                     std::size_t bytes) {
+  return impl_->gate().AdmitBrowser(address, authorization, bytes);
+}
+absl::Status RpcServer::SetTls(const TlsPair& tls) { return impl_->SetTls(tls); }
 std::shared_ptr<grpc::Channel> RpcServer::InProcessChannel() { return impl_->InProcessChannel(); }
 void RpcServer::Stop(std::chrono::milliseconds grace) { impl_->Stop(grace); }
 

@@ -9,10 +9,13 @@
 #include <string>
 
 #include "server/identity/access_book.hpp"
+#include "server/pipeline/connection_limits.hpp"
 #include "server/rpc/admission.hpp"
 #include "server/rpc/backend.hpp"
+#include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/session_table.hpp"
 #include "server/rpc/stream_hub.hpp"
+#include "server/rpc/traffic_gate.hpp"
 
 namespace grpc {
 class Channel;
@@ -32,6 +35,10 @@ struct RpcServerOptions {
   int max_request_bytes = 256 * 1024;
   SessionTableOptions sessions;
   RpcLimits limits;
+  TrafficLimits traffic;
+  ConnectionLimits connections;
+  /// PeerKey of the one proxy whose X-Forwarded-For is believed; empty: nobody's.
+  std::string trusted_proxy;
   /// A peer that answers no ping for so long is gone, even if its socket never says so.
   std::chrono::milliseconds keepalive_time{10'000};
   std::chrono::milliseconds keepalive_timeout{20'000};
@@ -40,6 +47,10 @@ struct RpcServerOptions {
   int max_threads = 16;
   /// TLS on the port; nothing: plain.
   std::optional<TlsPair> tls;
+  /// PEM of who vouches for machines: a client's certificate by it is an identity, with the role of
+  /// `machines`; one by anybody else ends the handshake. Empty: clients are asked for none.
+  std::string client_ca_pem;
+  MachineRoles machines;
   /// Who may come in; outlives the server. Null: everybody, and invites end with the server.
   AccessBook* access = nullptr;
   /// What a browser opens with an invite. Any thread.
@@ -47,7 +58,7 @@ struct RpcServerOptions {
   bool insecure = false;  // plain beyond loopback: told to every page
 };
 
-/// The gRPC server: every service of saccade.v1, health and reflection.
+/// The gRPC server: every service of saccade.v1 and health; reflection where nobody needs a token.
 class RpcServer {
  public:
   /// Binds and serves. `backend` and `hub` (connected to it) outlive the server.
@@ -57,8 +68,16 @@ class RpcServer {
   ~RpcServer();
 
   int port() const;
+  /// For the gateway, before it reads what a browser sends: Gatekeeper::AdmitBrowser. Any thread,
+  /// while the server lives.
+  absl::Status AdmitBrowser(absl::string_view address, absl::string_view authorization,
+                            std::size_t bytes);
   /// For the gateway: calls that do not pass a socket. Only while the server runs.
   std::shared_ptr<grpc::Channel> InProcessChannel();
+
+  /// Another certificate for who connects from now on, within some seconds; who is connected stays.
+  /// FailedPrecondition: the port is plain.
+  absl::Status SetTls(const TlsPair& tls);
 
   /// Ends the streams, lets calls finish for `grace`, then cancels them. May be called twice.
   void Stop(std::chrono::milliseconds grace);

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "server/rpc/early_handler.hpp"
 #include "server/rpc/status.hpp"
 #include "server/rpc/stream_writer.hpp"
 #include "server/rpc/unary_call.hpp"
@@ -24,7 +25,16 @@ class RefusedStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
 }  // namespace
 
 SessionService::SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gate)
-    : backend_(backend), hub_(hub), gate_(gate), started_ns_(MonotonicNow()) {}
+    : backend_(backend), hub_(hub), gate_(gate), started_ns_(MonotonicNow()) {
+  // By their numbers in the proto; limits_test calls every one, and Subscribe gets its bytes
+  // unparsed.
+  MarkMethodCallback(0, Early(gate, "SessionService/Join", this, &SessionService::Join));
+  MarkMethodCallback(2,
+                     Early(gate, "SessionService/Acknowledge", this, &SessionService::Acknowledge));
+  MarkMethodCallback(3, Early(gate, "SessionService/Ping", this, &SessionService::Ping));
+  MarkMethodCallback(4, Early(gate, "SessionService/GetFrame", this, &SessionService::GetFrame));
+  MarkMethodCallback(5, Early(gate, "SessionService/GetStatus", this, &SessionService::GetStatus));
+}
 
 grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* context,
                                                const v1::JoinRequest* request,
@@ -47,6 +57,11 @@ grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* cont
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::Subscribe(
     grpc::CallbackServerContext* context, const grpc::ByteBuffer* encoded) {
+  const absl::Status early = gate_.Arrive(*context, encoded->Length());
+  if (!early.ok()) {
+    Audit(kSubscribe, "", early);
+    return new RefusedStream(early);
+  }
   v1::SubscribeRequest request;
   grpc::ByteBuffer buffer = *encoded;  // the same bytes: reading one empties it
   if (!grpc::SerializationTraits<v1::SubscribeRequest>::Deserialize(&buffer, &request).ok()) {

@@ -21,8 +21,15 @@ std::string NewUuid() {
                          0x8000 | (c >> 16 & 0x3fff), c & 0xffff, d);
 }
 
-// Names go into others' lists and into the log: one line, and nothing that turns text about.
-absl::Status CheckName(const std::string& name) {
+v1::Role RoleWithin(v1::Role asked, AccessRole access) {
+  if (access < AccessRole::kAnnotator) return v1::ROLE_VIEWER;
+  if (asked == v1::ROLE_UNSPECIFIED) return v1::ROLE_EXPERT;
+  return asked == v1::ROLE_WEARER && access < AccessRole::kWearer ? v1::ROLE_EXPERT : asked;
+}
+
+}  // namespace
+
+absl::Status CheckDisplayName(const std::string& name) {
   absl::Status text = wire::CheckText(name, wire::kMaxNameBytes, "display_name");
   if (!text.ok()) return text;
   // Line and paragraph separators, marks and overrides of direction, as UTF-8.
@@ -42,17 +49,9 @@ absl::Status CheckName(const std::string& name) {
   return absl::OkStatus();
 }
 
-v1::Role RoleWithin(v1::Role asked, AccessRole access) {
-  if (access < AccessRole::kAnnotator) return v1::ROLE_VIEWER;
-  if (asked == v1::ROLE_UNSPECIFIED) return v1::ROLE_EXPERT;
-  return asked == v1::ROLE_WEARER && access < AccessRole::kWearer ? v1::ROLE_EXPERT : asked;
-}
-
-}  // namespace
-
 absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Timestamp now_ns,
                                            const Access& access) {
-  absl::Status name = CheckName(request.display_name());
+  absl::Status name = CheckDisplayName(request.display_name());
   if (!name.ok()) return name;
   if (!v1::Role_IsValid(request.role())) {
     return absl::InvalidArgumentError(
@@ -78,6 +77,7 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
     slot.used = true;
     return session;
   }
+  if (absl::Status own = CheckToken(access.id, now_ns); !own.ok()) return own;
   if (!MakeRoom(now_ns)) {
     return BusyError(absl::StrCat("sessions: ", sessions_.size(), " are in use, as many as may be"),
                      options_.unused_ns);
@@ -86,6 +86,30 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
   session.participant_id = NewUuid();
   sessions_[session.id] = {session, now_ns};
   return session;
+}
+
+// Of one's own sessions those that nobody uses make room: they are nobody else's.
+absl::Status SessionTable::CheckToken(const std::string& access_id, Timestamp now_ns) {
+  if (access_id.empty() || options_.max_sessions_of_token == 0) return absl::OkStatus();
+  std::size_t count = 0;
+  auto oldest = sessions_.end();
+  for (auto at = sessions_.begin(); at != sessions_.end(); ++at) {
+    const Slot& slot = at->second;
+    if (slot.session.access_id != access_id) continue;
+    ++count;
+    if (slot.holds > 0 || now_ns - slot.used_ns < options_.unused_ns) continue;
+    if (oldest == sessions_.end() || slot.used_ns < oldest->second.used_ns) oldest = at;
+  }
+  if (count < options_.max_sessions_of_token) return absl::OkStatus();
+  if (oldest == sessions_.end()) {
+    return BusyError(
+        absl::StrCat("sessions: ", count, " of this invite are in use, as many as may"),
+        options_.unused_ns);
+  }
+  if (oldest->second.used) gone_.push_back(oldest->second.session.participant_id);
+  sessions_.erase(oldest);
+  TellGone();
+  return absl::OkStatus();
 }
 
 // Who joined and did nothing goes first.

@@ -25,8 +25,13 @@ struct Session {
   std::string access_id;  // of the token that joined (Access::id); no other may use the session
 };
 
+/// One line that goes into others' lists and into the log. InvalidArgument: too long, or it holds a
+/// break or a mark that turns text about.
+absl::Status CheckDisplayName(const std::string& name);
+
 struct SessionTableOptions {
   std::size_t max_sessions = 1000;
+  std::size_t max_sessions_of_token = 32;  // 0: no limit; where there are no tokens there is none
   // Where the table is full, these make room, and only these: who works is never put out by who
   // joins.
   Timestamp unused_ns = 5'000'000'000;  // joined so long ago, and never heard of again
@@ -76,6 +81,7 @@ class SessionTable {
     int holds = 0;
   };
   bool MakeRoom(Timestamp now_ns);
+  absl::Status CheckToken(const std::string& access_id, Timestamp now_ns);
   void Release(const std::string& session_id);
   void TellGone();
 

@@ -13,7 +13,7 @@ constexpr std::size_t kMaxOutcomeBytes = 300;
 absl::StatusOr<Access> UnaryCall::Enter(Gatekeeper& gate, std::optional<Toll> toll) {
   book_ = &gate.book();
   absl::StatusOr<Access> access = gate.Enter(*context_, method_, toll);
-  NoteAccess();
+  NoteAccess(gate);
   return access;
 }
 
@@ -21,14 +21,14 @@ absl::StatusOr<Session> UnaryCall::Member(Gatekeeper& gate, std::optional<Toll> 
                                           const std::string& session_id) {
   book_ = &gate.book();
   absl::StatusOr<Session> session = gate.Member(*context_, method_, toll, session_id);
-  NoteAccess();
+  NoteAccess(gate);
   if (session.ok()) Is(*session);
   return session;
 }
 
 // Also of who is refused for another reason: it is they who tried.
-void UnaryCall::NoteAccess() {
-  const absl::StatusOr<Access> access = book_->Check(TokenOf(*context_));
+void UnaryCall::NoteAccess(const Gatekeeper& gate) {
+  const absl::StatusOr<Access> access = gate.Who(*context_);
   if (access.ok()) access_id_ = access->id;
 }
 

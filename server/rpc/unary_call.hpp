@@ -58,7 +58,7 @@ class UnaryCall {
   }
 
  private:
-  void NoteAccess();
+  void NoteAccess(const Gatekeeper& gate);
   void Keep(const absl::Status& status) const;
 
   Context* context_;  // gone once the call is finished

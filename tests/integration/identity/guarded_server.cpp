@@ -31,19 +31,30 @@ Outcome OutcomeOf(const grpc::Status& status) {
 
 }  // namespace
 
-GuardedServer::GuardedServer(const std::function<void(const std::string&)>& prepare) {
+GuardedServer::GuardedServer(const Options& options) {
   const std::string toml = folder_ / "server.toml";
-  // Every cell of a table at once is more than one person asks for.
-  std::ofstream(toml) << "[tls]\nrequired = true\n[auth]\nrequired = true\n[limits]\nscale = 0\n";
+  std::ofstream(toml) << options.top << "[tls]\nrequired = " << (options.tls ? "true" : "false")
+                      << "\n[auth]\nrequired = true\n[limits]\n"
+                      << options.limits << options.last;
   std::filesystem::create_directory(data_dir());
-  if (prepare) prepare(data_dir());
-  server_ = std::make_unique<Server>(std::vector<std::string>{
-      "--source", "sim:desk?width=320&height=240", "--config", toml, "--data-dir", data_dir()});
-  root_pem_ = ReadText(data_dir() + "/tls/authority.pem");
+  if (options.prepare) options.prepare(data_dir());
+  std::vector<std::string> command = {
+      "--source", "sim:desk?width=320&height=240", "--config", toml, "--data-dir", data_dir()};
+  command.insert(command.end(), options.flags.begin(), options.flags.end());
+  server_ = std::make_unique<Server>(command);
+  if (options.tls) root_pem_ = ReadText(data_dir() + "/tls/authority.pem");
   owner_token_ = nlohmann::json::parse(ReadText(data_dir() + "/owner.json")).at("token");
+  channel_ = NewChannel();
+}
+
+std::shared_ptr<grpc::Channel> GuardedServer::NewChannel() const {
+  grpc::ChannelArguments own;
+  own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   grpc::SslCredentialsOptions tls;
   tls.pem_root_certs = root_pem_;
-  channel_ = grpc::CreateChannel(server_->grpc(), grpc::SslCredentials(tls));
+  return grpc::CreateCustomChannel(
+      server_->grpc(),
+      root_pem_.empty() ? grpc::InsecureChannelCredentials() : grpc::SslCredentials(tls), own);
 }
 
 int GuardedServer::PortOf(const std::string& address) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "saccade/v1/access.grpc.pb.h"
 #include "tests/integration/support/process.hpp"
@@ -20,8 +21,19 @@ struct Outcome {
 /// saccade-server on the simulator, on loopback with TLS and invites, as it is beyond it.
 class GuardedServer {
  public:
-  /// `prepare` is told the data folder before the server starts.
-  explicit GuardedServer(const std::function<void(const std::string&)>& prepare = nullptr);
+  struct Options {
+    /// Is told the data folder before the server starts.
+    std::function<void(const std::string&)> prepare{};
+    /// [limits] of its file: none, as every cell of a table at once is more than one person asks
+    /// for.
+    std::string limits = "scale = 0\n";
+    std::string top{}, last{};         // of its file: first lines, last tables
+    std::vector<std::string> flags{};  // more of them
+    bool tls = true;
+  };
+  explicit GuardedServer(const Options& options);
+  explicit GuardedServer(const std::function<void(const std::string&)>& prepare = nullptr)
+      : GuardedServer(Options{.prepare = prepare}) {}
 
   int grpc_port() const { return PortOf(server_->grpc()); }
   int http_port() const { return PortOf(server_->http()); }
@@ -32,6 +44,8 @@ class GuardedServer {
   const std::string& http() const { return server_->http(); }
   Process& process() { return server_->process(); }
   std::shared_ptr<grpc::Channel> channel() const { return channel_; }
+  /// A connection of its own.
+  std::shared_ptr<grpc::Channel> NewChannel() const;
 
   /// An invite's token, and the id of the invite.
   std::string Invite(v1::AccessRole role, std::string* id = nullptr, std::uint32_t uses = 1);

@@ -22,6 +22,7 @@ struct HttpsRequest {
   std::string token;         // empty: none
   std::string body;
   std::string content_type;
+  std::string headers;  // more lines, each with \r\n
   /// Reads until the server ends the answer, at most so long; a stream's first message ends it,
   /// too.
   std::chrono::milliseconds patience{5000};

@@ -39,8 +39,8 @@ export interface SessionOptions {
   readonly kept?: KeptSession;
   /** The other tabs of this browser, where they can be asked. */
   readonly tabs?: Tabs;
-  /** Before joining: redeems an invite. Rejects if it lets nobody in. */
-  readonly enter?: (signal: AbortSignal) => Promise<void>;
+  /** Before joining: redeems an invite, and waits to be let in. Rejects if nobody lets one in. */
+  readonly enter?: (signal: AbortSignal, name: string, waiting: () => void) => Promise<void>;
 }
 
 const WINDOW = 32;
@@ -181,7 +181,7 @@ export class Session {
   private async runOnce(attempt: AbortController): Promise<void> {
     const { signal } = attempt;
     const { view, topics = [] } = this.options;
-    await this.options.enter?.(signal);
+    await this.options.enter?.(signal, this.displayName, () => (this.link = { kind: 'waiting' }));
     const joined = await this.joining.join(
       signal,
       (tabs) => (this.link = { kind: 'crowded', tabs }),

@@ -130,6 +130,8 @@ export type Target =
 
 export type Link =
   | { readonly kind: 'connecting' }
+  /** Somebody there has to let us in. */
+  | { readonly kind: 'waiting' }
   /** As many tabs of this browser are connected as it has connections for. */
   | { readonly kind: 'crowded'; readonly tabs: number }
   | { readonly kind: 'live' }

@@ -10,6 +10,7 @@ interface Pass {
   readonly token: string;
 }
 
+const LOOK_MS = 1000; // whether one was let in
 const KEY = 'saccade.pass';
 const FRAGMENT = /^#invite=(.+)$/;
 
@@ -53,12 +54,27 @@ export class Access {
     return this.pass?.token ?? '';
   }
 
-  /** Redeems the invite of the link, if that was not done yet. Rejects if it lets nobody in. */
-  async enter(signal: AbortSignal): Promise<void> {
+  /**
+   * Redeems the invite of the link, if that was not done yet, under the name that who lets people in
+   * sees; `waiting` is told while nobody has. Rejects if one is not let in.
+   */
+  async enter(signal: AbortSignal, displayName = '', waiting?: () => void): Promise<void> {
     const { invite } = this;
-    if (invite === undefined) return;
+    if (invite !== undefined) await this.redeem(invite, displayName, signal);
+    if (this.pass === undefined) return;
+    for (;;) {
+      const told = await this.client.getAccess({}, { signal, timeoutMs: 5000 });
+      if (!told.waiting) return; // what else there is to say, joining says
+      waiting?.();
+      await sleep(LOOK_MS, signal);
+      signal.throwIfAborted();
+    }
+  }
+
+  private async redeem(invite: string, displayName: string, signal: AbortSignal): Promise<void> {
     this.pass = undefined; // who opens another link means that one
-    const { token } = await this.client.redeem({ invite }, { signal, timeoutMs: 5000 });
+    const request = { invite, displayName };
+    const { token } = await this.client.redeem(request, { signal, timeoutMs: 5000 });
     this.invite = undefined;
     this.pass = { inviteId: idOf(invite), token };
     const kept = JSON.stringify(this.pass);
@@ -71,6 +87,16 @@ export class Access {
     }
   }
 }
+
+const sleep = (ms: number, signal: AbortSignal): Promise<void> =>
+  new Promise((resolve) => {
+    const timer = setTimeout(resolve, ms);
+    const stop = (): void => {
+      clearTimeout(timer);
+      resolve();
+    };
+    signal.addEventListener('abort', stop, { once: true });
+  });
 
 const idOf = (invite: string): string => invite.split('.', 1)[0] ?? '';
 

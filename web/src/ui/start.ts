@@ -7,6 +7,7 @@ import { Access, inviteOf } from '../transport/access';
 import { createClients } from '../transport/clients';
 import { h, letGoOfButtons, storage, tabStorage } from './dom';
 import { Player } from './player';
+import { WaitingRoom } from './waiting_room';
 
 /** What a page shows of a session. */
 interface Page {
@@ -21,7 +22,8 @@ export function startPage(
 ): void {
   const access = new Access(location.origin, takeInvite(), tabStorage(), storage());
   const token = (): string => access.token;
-  const enter = (signal: AbortSignal): Promise<void> => access.enter(signal);
+  const enter: SessionOptions['enter'] = (signal, name, waiting) =>
+    access.enter(signal, name, waiting);
   const player = new Player();
   const kept = new KeptSession(tabStorage(), options.role, !reloaded());
   const tabs = new Tabs(new BroadcastChannel('saccade'), newUuid(), openedMs(tabStorage()));
@@ -30,7 +32,7 @@ export function startPage(
   player.attach(session);
   const page = makePage(session, player, token);
   document.body.append(page.element);
-  void warnOfInsecure(access);
+  void greet(access, session);
   page.start();
   const leaving = new AbortController();
   window.addEventListener('pagehide', () => {
@@ -57,7 +59,11 @@ function takeInvite(): string | undefined {
   return invite;
 }
 
-async function warnOfInsecure(access: Access): Promise<void> {
+/** What a page shows beside its own: that nothing is protected, and who wants to come in. */
+async function greet(access: Access, session: Session): Promise<void> {
+  const room = new WaitingRoom(access, session);
+  document.body.append(room.element);
+  room.start();
   const told = await access.client.getAccess({}, { timeoutMs: 5000 }).catch(() => undefined);
   if (!told?.insecure) return;
   const words =

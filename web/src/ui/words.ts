@@ -27,12 +27,15 @@ export interface StatusInput {
 }
 
 const NO_PICTURE_MS = 2000;
+const WAITING_ADVICE = 'the wearer sees that you are here; this page goes on by itself';
 
 export function statusWords(input: StatusInput): StatusWords {
   const { link, pose, sourceEnded, nowMs, poseMs = nowMs } = input;
   switch (link.kind) {
     case 'connecting':
       return { mark: '◌', text: 'connecting', advice: '', warn: false };
+    case 'waiting':
+      return { mark: '◌', text: 'waiting to be let in', advice: WAITING_ADVICE, warn: false };
     case 'crowded':
       return { mark: '■', text: 'too many tabs', advice: crowdedWords(link.tabs), warn: true };
     case 'refused':

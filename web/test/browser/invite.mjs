@@ -3,6 +3,7 @@
 import { execFileSync, spawnSync } from 'node:child_process';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
+import { checkConstraints } from './constraints.mjs';
 import { Expert } from './expert.mjs';
 import { startServer } from './server.mjs';
 
@@ -19,6 +20,7 @@ function makeNetwork() {
   return {
     prefix: ['ip', 'netns', 'exec', name],
     host: OUTSIDE,
+    add: (address) => ip('-n', name, 'addr', 'add', `${address}/32`, 'dev', 'lo'),
     close: () => ip('netns', 'del', name),
   };
 }
@@ -28,7 +30,7 @@ export async function runInvite({ server: binary, chromium, seed, shots, folder 
   const prefix = network?.prefix ?? [];
   const host = network?.host ?? '127.0.0.1';
   const data = join(folder, 'data');
-  const context = { failures: 0, shots, chromium, folder, prefix, host };
+  const context = { failures: 0, shots, chromium, folder, prefix, host, network, data };
   context.check = (name, ok, figures) => {
     console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
     if (!ok) ++context.failures;
@@ -49,6 +51,7 @@ export async function runInvite({ server: binary, chromium, seed, shots, folder 
     context.server = await startServer(binary, [...common, ...listen, ...asked], prefix);
     context.url = `https://${context.server.address}`;
     await checkLinks(context);
+    if (network) await checkConstraints(context, join(folder, 'home'));
     await context.server.stop();
     if (network) {
       context.server = await startServer(binary, [...common, ...listen, '--insecure'], prefix);

@@ -1,6 +1,6 @@
 // What lets a browser in: the invite of a link, the pass it is redeemed for, and what is kept of both.
 import { Code, ConnectError } from '@connectrpc/connect';
-import { describe, expect, it } from 'vitest';
+import { describe, expect, it, vi } from 'vitest';
 import { Access, inviteOf } from '../../src/transport/access';
 import { isRefusal, plainWords, streamEndWords } from '../../src/transport/errors';
 
@@ -14,8 +14,13 @@ class Memory {
 /** A server that redeems each invite once. */
 class Door {
   readonly redeemed: string[] = [];
+  readonly names: string[] = [];
+  waits = 0; // so often one is told to wait
+  refusal = '';
   readonly client = {
-    redeem: ({ invite }: { invite: string }) => {
+    getAccess: () => Promise.resolve({ waiting: this.waits-- > 0, refusal: this.refusal }),
+    redeem: ({ invite, displayName }: { invite: string; displayName: string }) => {
+      this.names.push(displayName);
       if (this.redeemed.includes(invite)) {
         const words = 'access: this invite has been used up; ask for a new one';
         return Promise.reject(new ConnectError(words, Code.Unauthenticated));
@@ -50,6 +55,30 @@ describe('Access', () => {
       expect(access.token).toBe('pass of i1.secret');
     }
     expect(door.redeemed).toEqual(['i1.secret']);
+  });
+
+  it('waits until somebody lets one in, under the name that they see', async () => {
+    vi.useFakeTimers();
+    const door = new Door();
+    door.waits = 3;
+    const access = open(door, 'i1.secret', new Memory(), new Memory());
+    let told = 0;
+    const entered = access.enter(signal, 'Ada', () => ++told);
+    await vi.advanceTimersByTimeAsync(2500);
+    expect(told).toBe(3);
+    await vi.advanceTimersByTimeAsync(1000);
+    await entered;
+    expect(door.names).toEqual(['Ada']);
+    vi.useRealTimers();
+  });
+
+  it('stops to wait when the page is left', async () => {
+    const door = new Door();
+    door.waits = 1000;
+    const leaving = new AbortController();
+    const access = open(door, 'i1.secret', new Memory(), new Memory());
+    const entered = access.enter(leaving.signal, 'Ada', () => leaving.abort());
+    await expect(entered).rejects.toThrow();
   });
 
   it('keeps the secret of no invite', async () => {

@@ -172,7 +172,7 @@ TEST(ServerConfig, ThePrintedFileSaysEverythingAndChangesNothing) {
   EXPECT_EQ(config.data_dir, plain.data_dir);
   EXPECT_EQ(config.grpc.port, plain.grpc.port);
   EXPECT_EQ(config.seed, plain.seed);
-  EXPECT_EQ(config.limits_scale, plain.limits_scale);
+  EXPECT_EQ(config.limits.scale, plain.limits.scale);
   EXPECT_EQ(config.video_bit_rate_bit_s, plain.video_bit_rate_bit_s);
   TrackerOptions tracker;
   EXPECT_TRUE(tracker.LoadToml(file).ok()) << tracker.LoadToml(file);

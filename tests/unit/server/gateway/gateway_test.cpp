@@ -270,7 +270,7 @@ TEST_F(GatewayTest, StopEndsStreamsPromptly) {
 
 TEST_F(GatewayTest, AtTheLimitWhoeverIsIdleLongestGivesWay) {
   GatewayOptions options;
-  options.max_connections = 2;
+  options.connections.all = 2;
   StartWith(options);
   HttpClient first(port());
   HttpClient second(port());
@@ -284,7 +284,7 @@ TEST_F(GatewayTest, AtTheLimitWhoeverIsIdleLongestGivesWay) {
 
 TEST_F(GatewayTest, AtTheLimitWhoIsBeingAnsweredStays) {
   GatewayOptions options;
-  options.max_connections = 2;
+  options.connections.all = 2;
   StartWith(options);
   HttpClient first(port());
   first.SendCall("/test.v1.Test/Silent", "");

@@ -12,6 +12,7 @@
 #include <mutex>
 
 #include "server/identity/secret.hpp"
+#include "server/store/sqlite.hpp"
 #include "tests/unit/server/identity/temporary_folder.hpp"
 
 namespace saccade {
@@ -186,6 +187,94 @@ TEST(InviteDraft, IsRefusedByField) {
   EXPECT_THAT(refusal(AccessRole::kViewer, 59, 1, 0), HasSubstr("life_s"));
   EXPECT_THAT(refusal(AccessRole::kViewer, 60, 0, 0), HasSubstr("uses"));
   EXPECT_THAT(refusal(AccessRole::kViewer, 60, 1, 61), HasSubstr("label"));
+}
+
+TEST(WaitingRoom, KeepsWhoWaitsOverARestartAndForgetsWhoWasDecidedOn) {
+  const TemporaryFolder folder;
+  std::string ada, eve, id_of_ada;
+  {
+    const auto book = *AccessBook::Open(folder.path(), Options());
+    const Issued invite = *Wait<Issued>([&](auto done) {
+      book->CreateInvite({AccessRole::kPilot, 3600, 3, "experts", true}, done);
+    });
+    const auto come = [&](const std::string& name) {
+      return Wait<Issued>([&](auto done) { book->Redeem(invite.token, done, name); })->token;
+    };
+    ada = come("Ada");
+    eve = come("Eve");
+    come("");
+    ASSERT_EQ(book->Waiting().size(), 3u);
+    for (const WaitingFacts& one : book->Waiting()) {
+      if (one.display_name == "Ada") id_of_ada = one.id;
+      if (one.display_name != "Eve") continue;
+      EXPECT_EQ(one.label, "experts");
+      const std::string id = one.id;
+      EXPECT_TRUE(Wait<WaitingFacts>([&](auto done) { book->Admit(id, true, done); }).ok());
+    }
+  }
+  const auto book = *AccessBook::Open(folder.path(), Options());
+  EXPECT_EQ(book->Waiting().size(), 2u);
+  EXPECT_TRUE(book->Check(ada)->waiting);
+  EXPECT_THAT(Text(book->Check(eve).status()), HasSubstr("you were not let in"));
+  EXPECT_TRUE(Wait<WaitingFacts>([&](auto done) { book->Admit(id_of_ada, false, done); }).ok());
+  EXPECT_FALSE(book->Check(ada)->waiting);
+  EXPECT_EQ(
+      Wait<WaitingFacts>([&](auto done) { book->Admit(id_of_ada, true, done); }).status().code(),
+      absl::StatusCode::kNotFound);
+}
+
+TEST(WaitingRoom, AsASettingHoldsEverybodyBelowTheWearer) {
+  AccessBook::Options options = Options();
+  options.waiting_room = true;
+  const auto book = AccessBook::InMemory(options);
+  EXPECT_TRUE(Redeem(*book, Invite(*book, AccessRole::kPilot).token)->waiting);
+  EXPECT_FALSE(Redeem(*book, Invite(*book, AccessRole::kWearer).token)->waiting);
+}
+
+// Written by the version before the waiting room.
+TEST(AccessBook, AnOlderFileGoesOn) {
+  const TemporaryFolder folder;
+  std::string pass;
+  {
+    const auto book = *AccessBook::Open(folder.path(), Options());
+    pass = Redeem(*book, Invite(*book, AccessRole::kPilot).token)->token;
+  }
+  {
+    const auto database = *SqliteDatabase::Open(folder / "access.sqlite");
+    for (const char* step :
+         {"ALTER TABLE invites DROP COLUMN waits", "ALTER TABLE passes DROP COLUMN display_name",
+          "ALTER TABLE passes DROP COLUMN since_unix_s", "ALTER TABLE passes DROP COLUMN state",
+          "PRAGMA user_version = 1"}) {
+      ASSERT_TRUE(database->Execute(step).ok()) << step;
+    }
+  }
+  const auto book = *AccessBook::Open(folder.path(), Options());
+  EXPECT_TRUE(book->Check(pass).ok());
+  EXPECT_FALSE(book->Check(pass)->waiting);
+}
+
+TEST(Audit, WhoIsRefusedOverAndOverPushesNobodysDeedsOut) {
+  const TemporaryFolder folder;
+  const auto book = *AccessBook::Open(folder.path(), Options());
+  book->Record({0, "", "Ann", "p1", "", "AnnotationService/Create", "ok"});
+  for (int i = 0; i < 900; ++i) {
+    book->Record({0, "", "Eve", "p2", "", "MapService/Reset", "PERMISSION_DENIED"});
+  }
+  book->Record({0, "", "Bob", "p3", "", "MapService/Reset", "PERMISSION_DENIED"});
+  const auto entries =
+      Wait<std::vector<AuditFacts>>([&](auto done) { book->ReadAudit(10'000, std::move(done)); });
+  ASSERT_TRUE(entries.ok());
+  int of_eve = 0, others = 0;
+  bool told = false;
+  for (const AuditFacts& one : *entries) {
+    of_eve += one.display_name == "Eve";
+    others += one.display_name == "Ann" || one.display_name == "Bob";
+    told = told || one.call.find(" more that came too fast") != std::string::npos;
+  }
+  EXPECT_LE(of_eve, 60);
+  EXPECT_GE(of_eve, 20) << "that she tried is to be seen";
+  EXPECT_EQ(others, 2);
+  EXPECT_TRUE(told);
 }
 
 }  // namespace

@@ -2,13 +2,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <openssl/x509_vfy.h>
 #include <sys/stat.h>
 
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 
 #include "server/identity/certificate_files.hpp"
+#include "server/identity/openssl_owners.hpp"
 #include "tests/unit/server/identity/temporary_folder.hpp"
 
 namespace saccade {
@@ -39,6 +42,64 @@ TEST(Certificate, OfTheAuthorityNamesTheServerAndHoldsThirteenMonths) {
   EXPECT_LE(facts->not_after_unix_s - facts->not_before_unix_s, 398 * kDay_s);
   EXPECT_GT(facts->not_after_unix_s, kNow + 390 * kDay_s);
   EXPECT_EQ(facts->sha256.size(), 95u);
+}
+
+/// OpenSSL's own judgement of a server's certificate.
+int Verify(const std::string& certificate_pem, const std::string& root_pem) {
+  const X509Owner certificate = ReadCertificate(certificate_pem), root = ReadCertificate(root_pem);
+  const std::unique_ptr<X509_STORE, decltype(&X509_STORE_free)> store(X509_STORE_new(),
+                                                                      X509_STORE_free);
+  X509_STORE_add_cert(store.get(), root.get());
+  const std::unique_ptr<X509_STORE_CTX, decltype(&X509_STORE_CTX_free)> context(
+      X509_STORE_CTX_new(), X509_STORE_CTX_free);
+  X509_STORE_CTX_init(context.get(), store.get(), certificate.get(), nullptr);
+  X509_STORE_CTX_set_purpose(context.get(), X509_PURPOSE_SSL_SERVER);
+  X509_verify_cert(context.get());
+  return X509_STORE_CTX_get_error(context.get());
+}
+
+TEST(NameConstraints, AnAuthorityVouchesForItsOwnNamesAndPrivateAddresses) {
+  const ServerNames own{{"localhost", "box"}, {"127.0.0.1", "203.0.113.5", "2001:db8:1:2::5"}};
+  const auto authority = MakeAuthority("Saccade on box", own);
+  ASSERT_TRUE(authority.ok()) << authority.status();
+  const auto judge = [&](const ServerNames& names) {
+    return Verify(MakeServerCertificate(*authority, names)->certificate_pem,
+                  authority->certificate_pem);
+  };
+  EXPECT_EQ(judge(own), X509_V_OK);
+  EXPECT_EQ(judge({{"box.local"}, {"10.20.30.40", "192.168.1.9", "fd00::7", "::1"}}), X509_V_OK)
+      << "the next network needs no new authority";
+  EXPECT_EQ(judge({{}, {"2001:db8:1:2:9999::1"}}), X509_V_OK) << "the same network";
+  for (const ServerNames& foreign :
+       {ServerNames{{"www.example.com"}, {}}, ServerNames{{"box", "example.com"}, {}},
+        ServerNames{{}, {"203.0.113.6"}}, ServerNames{{}, {"2001:db8:1:3::5"}},
+        ServerNames{{"notbox"}, {}}}) {
+    EXPECT_EQ(judge(foreign), X509_V_ERR_PERMITTED_VIOLATION) << foreign.All().back();
+  }
+}
+
+TEST(NameConstraints, WhatAnAuthorityMayNotNameIsLeftOutAndSaid) {
+  const TemporaryFolder folder;
+  const auto first = EnsureServerIdentity(folder.path(), kNames, kNow);
+  ASSERT_TRUE(first.ok());
+  EXPECT_TRUE(first->not_named.empty());
+  ServerNames more = kNames;
+  more.Add("saccade.example.org");
+  more.Add("10.200.0.1");
+  const auto later = EnsureServerIdentity(folder.path(), more, kNow);
+  ASSERT_TRUE(later.ok());
+  EXPECT_EQ(later->not_named, std::vector<std::string>{"saccade.example.org"});
+  EXPECT_EQ(later->root_pem, first->root_pem) << "who trusts it need not do so again";
+  EXPECT_EQ(Verify(later->chain_pem, later->root_pem), X509_V_OK);
+  EXPECT_THAT(InspectCertificate(later->chain_pem)->names.addresses, Contains("10.200.0.1"));
+  const auto again = EnsureServerIdentity(folder.path(), more, kNow);
+  EXPECT_EQ(again->chain_pem, later->chain_pem) << "asked again, nothing is made";
+}
+
+TEST(NameConstraints, AnOlderAuthorityWithoutThemIsKept) {
+  const auto authority = MakeAuthority("old");
+  EXPECT_EQ(
+      PermittedBy(authority->certificate_pem, {{"any.example"}, {"203.0.113.5"}}).All().size(), 2u);
 }
 
 TEST(Certificate, OfAnotherAuthorityIsNotOurs) {

@@ -28,6 +28,16 @@ TEST(RateLimiter, GivesABurstThenItsRateAndSaysHowLongToWait) {
   EXPECT_NEAR(granted, 105, 2);
 }
 
+TEST(RateLimiter, WhatIsLargerThanABurstIsPaidOffAfterwards) {
+  RateLimiter limiter({.per_s = 1000, .burst = 4000});
+  EXPECT_FALSE(limiter.Take("a", 0, 10'000).has_value()) << "else it would never be";
+  const auto wait_ns = limiter.Take("a", 0, 1000);
+  ASSERT_TRUE(wait_ns.has_value());
+  EXPECT_EQ(*wait_ns, 7 * kSecond);
+  EXPECT_TRUE(limiter.Take("a", 6 * kSecond, 1000).has_value());
+  EXPECT_FALSE(limiter.Take("a", 7 * kSecond, 1000).has_value());
+}
+
 TEST(RateLimiter, NoLimitIsNone) {
   RateLimiter limiter({});
   for (int i = 0; i < 10'000; ++i) ASSERT_FALSE(limiter.Take("a", 0).has_value());

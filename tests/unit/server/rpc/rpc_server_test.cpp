@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cstdio>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -110,6 +111,51 @@ class RpcServerTest : public ::testing::Test {
   StreamHub hub_{/*silence_ns=*/300'000'000};
   std::unique_ptr<RpcServer> server_;
 };
+
+/// CPU time of this process for each call [us], client included, of requests as large as may be.
+double CpuOf(const std::shared_ptr<grpc::Channel>& channel, int calls, grpc::StatusCode expected) {
+  v1::CreateAnnotationRequest request;
+  request.set_session_id("nobody's");
+  for (int i = 0; i < 8000; ++i) {
+    v1::Pixel& point = *request.mutable_draft()->add_ink_px();
+    point.set_u(1 + i);
+    point.set_v(2 + i);
+  }
+  const auto stub = v1::AnnotationService::NewStub(channel);
+  const auto now_us = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return 1e6 * static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+           static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  };
+  const double before_us = now_us();
+  for (int i = 0; i < calls; ++i) {
+    grpc::ClientContext context;
+    v1::CreateAnnotationResponse response;
+    EXPECT_EQ(stub->Create(&context, request, &response).error_code(), expected);
+  }
+  return (now_us() - before_us) / calls;
+}
+
+// What is served here is refused as well, but for what it says: a lower bound.
+TEST_F(RpcServerTest, AnEarlyRefusalCostsLessThanServing) {
+  RpcServerOptions options;
+  options.limits = RpcLimits().Scaled(0);
+  Start(options);
+  const double served_us = CpuOf(Channel(), 400, grpc::StatusCode::INVALID_ARGUMENT);
+  options.traffic.this_machine = true;
+  options.traffic.address_requests = {1e-6, 1};
+  options.port = 0;
+  auto strict = RpcServer::Start(options, backend_, hub_);
+  ASSERT_TRUE(strict.ok()) << strict.status();
+  server_ = *std::move(strict);
+  v1::JoinResponse taken;
+  EXPECT_TRUE(Join(taken).ok()) << "the only one";
+  const double refused_us = CpuOf(Channel(), 400, grpc::StatusCode::RESOURCE_EXHAUSTED);
+  std::printf("CPU a call: served %.0f us, refused %.0f us (%.2f)\n", served_us, refused_us,
+              refused_us / served_us);
+  EXPECT_LT(refused_us, 0.9 * served_us);
+}
 
 // List used to iterate over a list that nobody held any more: a crash within a second.
 TEST_F(RpcServerTest, ListHoldsWhatItReadsWhileOthersEdit) {

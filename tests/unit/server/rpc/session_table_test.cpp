@@ -26,6 +26,24 @@ TEST(SessionTable, IdsAreDistinctUuids) {
   EXPECT_EQ(ids.size(), 200u);
 }
 
+TEST(SessionTable, APassHasItsShareOfSessionsAndThoseThatNobodyUsesMakeRoom) {
+  SessionTable sessions({.max_sessions_of_token = 3});
+  const Access ours{"p1", AccessRole::kPilot, 0}, theirs{"p2", AccessRole::kPilot, 0};
+  std::vector<std::string> ids;
+  for (int i = 0; i < 3; ++i) ids.push_back(sessions.Join({}, 0, ours)->id);
+  const auto fourth = sessions.Join({}, 1, ours);
+  EXPECT_EQ(fourth.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_GT(RetryAfterOf(fourth.status()), 0);
+  EXPECT_TRUE(sessions.Join({}, 1, theirs).ok()) << "another pass has its own";
+  v1::JoinRequest resume;
+  resume.set_resume_session_id(ids[1]);
+  EXPECT_TRUE(sessions.Join(resume, 1, ours).ok()) << "is one of the three";
+  const auto held = sessions.Hold(ids[0]);
+  EXPECT_TRUE(sessions.Join({}, 6'000'000'000, ours).ok());
+  EXPECT_TRUE(sessions.Find(ids[0]).ok()) << "has a stream";
+  EXPECT_FALSE(sessions.Find(ids[2]).ok()) << "was unused for longest";
+}
+
 TEST(SessionTable, AViewerMayLookAndNotTouch) {
   SessionTable sessions;
   v1::JoinRequest request;

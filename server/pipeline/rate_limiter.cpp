@@ -1,4 +1,4 @@
-#include "server/rpc/rate_limiter.hpp"
+#include "server/pipeline/rate_limiter.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,16 +24,17 @@ RateLimiter::Bucket& RateLimiter::BucketOf(absl::string_view key, Timestamp now_
   return buckets_.try_emplace(std::string(key), Bucket{limit_.burst, now_ns}).first->second;
 }
 
-std::optional<Timestamp> RateLimiter::Take(absl::string_view key, Timestamp now_ns) {
+std::optional<Timestamp> RateLimiter::Take(absl::string_view key, Timestamp now_ns, double amount) {
   if (limit_.per_s <= 0) return std::nullopt;
   const std::lock_guard lock(mutex_);
   Bucket& bucket = BucketOf(key, now_ns);
   Fill(bucket, now_ns);
-  if (bucket.tokens >= 1) {
-    bucket.tokens -= 1;
+  const double needed = std::min(amount, limit_.burst);
+  if (bucket.tokens >= needed) {
+    bucket.tokens -= amount;
     return std::nullopt;
   }
-  return static_cast<Timestamp>(std::ceil(1e9 * (1 - bucket.tokens) / limit_.per_s));
+  return static_cast<Timestamp>(std::ceil(1e9 * (needed - bucket.tokens) / limit_.per_s));
 }
 
 std::size_t RateLimiter::size() const {

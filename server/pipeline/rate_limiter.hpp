@@ -24,8 +24,9 @@ class RateLimiter {
   explicit RateLimiter(const RateLimit& limit, std::size_t max_keys = 4096)
       : limit_(limit), max_keys_(max_keys) {}
 
-  /// Takes one. Nothing: granted; else how long until there is one [ns].
-  std::optional<Timestamp> Take(absl::string_view key, Timestamp now_ns);
+  /// Takes `amount`. Nothing: granted; else how long until there is so much [ns]. More than a burst
+  /// is granted to a full bucket, which then has debts.
+  std::optional<Timestamp> Take(absl::string_view key, Timestamp now_ns, double amount = 1);
 
   std::size_t size() const;
 

@@ -1,0 +1,63 @@
+#include "server/pipeline/peer_address.hpp"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
+#include <arpa/inet.h>
+
+#include <array>
+
+namespace saccade {
+namespace {
+
+constexpr absl::string_view kMapped = "::ffff:";
+constexpr absl::string_view kBearer = "bearer ";
+
+bool IsLiteral(const std::string& text) {
+  std::array<unsigned char, 16> bytes{};
+  return inet_pton(AF_INET, text.c_str(), bytes.data()) == 1 ||
+         inet_pton(AF_INET6, text.c_str(), bytes.data()) == 1;
+}
+
+}  // namespace
+
+std::string PeerKey(absl::string_view address) {
+  if (absl::StartsWithIgnoreCase(address, kMapped) && absl::StrContains(address, '.')) {
+    address.remove_prefix(kMapped.size());
+  }
+  std::array<unsigned char, 16> bytes{};
+  if (inet_pton(AF_INET6, std::string(address).c_str(), bytes.data()) != 1) {
+    return absl::StrCat("ipv4:", address);
+  }
+  if (IN6_IS_ADDR_LOOPBACK(reinterpret_cast<const in6_addr*>(bytes.data()))) return "ipv6:::1";
+  std::string network = "ipv6:";
+  for (std::size_t i = 0; i < 8; ++i)
+    absl::StrAppend(&network, absl::Hex(bytes[i], absl::kZeroPad2));
+  return network;
+}
+
+bool IsThisMachine(absl::string_view peer) {
+  return absl::StartsWith(peer, "ipv4:127.") || peer == "ipv6:::1" ||
+         absl::StartsWith(peer, "unix") || absl::StartsWith(peer, "inproc");
+}
+
+std::string ForwardedFor(absl::string_view header) {
+  const std::size_t comma = header.rfind(',');
+  if (comma != absl::string_view::npos) header.remove_prefix(comma + 1);
+  header = absl::StripAsciiWhitespace(header);
+  if (absl::ConsumePrefix(&header, "[")) header = header.substr(0, header.find(']'));
+  // "192.0.2.7:41000": some write the port as well.
+  std::string address(header);
+  if (!IsLiteral(address) && address.find(':') == address.rfind(':')) {
+    address = address.substr(0, address.find(':'));
+  }
+  return IsLiteral(address) ? address : "";
+}
+
+absl::string_view TokenIn(absl::string_view authorization) {
+  if (!absl::StartsWithIgnoreCase(authorization, kBearer)) return authorization;
+  return absl::StripAsciiWhitespace(authorization.substr(kBearer.size()));
+}
+
+}  // namespace saccade

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <absl/strings/string_view.h>
+
+#include <string>
+
+namespace saccade {
+
+/// By what a caller is counted: "ipv4:127.0.0.1", "ipv6:2001:db8:0:1" (the first 64 bits, one
+/// household). `address` is an IP literal; an IPv4 caller of a socket for both is himself.
+std::string PeerKey(absl::string_view address);
+
+/// Whether who is counted so is on this machine: loopback, a socket file, or the process itself.
+bool IsThisMachine(absl::string_view peer);
+
+/// The caller's address that a proxy's X-Forwarded-For tells: the last one, which the proxy itself
+/// wrote; what stands before it, anybody may have. Empty: no IP literal stands there.
+std::string ForwardedFor(absl::string_view header);
+
+/// "Bearer TOKEN" without its first word; anything else as it is: no token of ours, and so refused.
+absl::string_view TokenIn(absl::string_view authorization);
+
+}  // namespace saccade

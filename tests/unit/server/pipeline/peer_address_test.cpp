@@ -1,0 +1,41 @@
+#include "server/pipeline/peer_address.hpp"
+
+#include <gtest/gtest.h>
+
+namespace saccade {
+namespace {
+
+TEST(PeerAddress, AHouseholdIsOneCallerAndAMappedAddressIsItself) {
+  EXPECT_EQ(PeerKey("192.0.2.7"), "ipv4:192.0.2.7");
+  EXPECT_EQ(PeerKey("::ffff:192.0.2.7"), "ipv4:192.0.2.7");
+  EXPECT_EQ(PeerKey("2001:db8:0:1::5"), PeerKey("2001:db8:0:1:ffff::9"));
+  EXPECT_NE(PeerKey("2001:db8:0:1::5"), PeerKey("2001:db8:0:2::5"));
+}
+
+TEST(PeerAddress, ThisMachineIsLoopbackAndNothingElse) {
+  for (const char* own : {"127.0.0.1", "127.1.2.3", "::1"})
+    EXPECT_TRUE(IsThisMachine(PeerKey(own)));
+  for (const char* other : {"128.0.0.1", "10.127.0.1", "::2", "2001:db8::1"}) {
+    EXPECT_FALSE(IsThisMachine(PeerKey(other))) << other;
+  }
+}
+
+TEST(PeerAddress, OfForwardedForOnlyWhatTheProxyWroteCounts) {
+  EXPECT_EQ(ForwardedFor("203.0.113.7"), "203.0.113.7");
+  EXPECT_EQ(ForwardedFor("127.0.0.1, 10.0.0.1,  203.0.113.7 "), "203.0.113.7");
+  EXPECT_EQ(ForwardedFor("203.0.113.7:41000"), "203.0.113.7");
+  EXPECT_EQ(ForwardedFor("[2001:db8::1]:41000"), "2001:db8::1");
+  EXPECT_EQ(ForwardedFor("2001:db8::1"), "2001:db8::1");
+  for (const char* bad : {"", "unknown", "203.0.113.7, _hidden", "203.0.113.7,", "300.1.1.1"}) {
+    EXPECT_EQ(ForwardedFor(bad), "") << bad;
+  }
+}
+
+TEST(PeerAddress, ATokenStandsBehindBearer) {
+  EXPECT_EQ(TokenIn("Bearer p1.secret"), "p1.secret");
+  EXPECT_EQ(TokenIn("bearer  p1.secret "), "p1.secret");
+  EXPECT_EQ(TokenIn("Basic abc"), "Basic abc");
+}
+
+}  // namespace
+}  // namespace saccade
