@@ -51,7 +51,8 @@ struct Setting {
 const std::vector<Setting>& Settings() {
   static const std::vector<Setting> settings = {
       {"source", "--source", &Raw::source,
-       "sim:desk[?...] | dataset:DIR[?fps=N] | v4l2:DEVICE[?...] | file:VIDEO[?...] | rtsp://... | phone:[?...]"},
+       "sim:desk[?...] | dataset:DIR[?fps=N] | v4l2:DEVICE[?...] | file:VIDEO[?...] | rtsp://... | "
+       "phone:[?...]"},
       {"mount", "--mount", &Raw::mount, MountDrivers().Usage()},
       {nullptr, "--config", &Raw::config, "TOML file; flags win over it"},
       {"data_dir", "--data-dir", &Raw::data_dir, "annotations are kept here"},
