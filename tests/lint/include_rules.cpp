@@ -43,7 +43,7 @@ struct Home {
 const std::vector<Home>& Homes() {
   static const std::vector<Home> homes = {
       {"*.grpc.pb.h", {"server/rpc", "client/net"}},
-      {"*.pb.h", {"shared/wire", "server/rpc", "client/net"}},
+      {"*.pb.h", {"shared/wire", "server/rpc", "server/wear", "client/net"}},
       {"grpcpp/", {"server/rpc", "server/gateway", "server/app", "client/net"}},
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},
