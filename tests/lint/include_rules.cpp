@@ -17,7 +17,7 @@ using std::string_view;
 constexpr auto kServerOrder = std::to_array<string_view>(
     {"pipeline", "mount",    "gl",      "capture", "sim",      "features", "filter",
      "map",      "tracker",  "anchors", "gaze",    "wearable", "overlay",  "encode",
-     "store",    "identity", "rpc",     "gateway", "eval",     "app"});
+     "store",    "identity", "rpc",     "wear",    "gateway",  "eval",     "app"});
 constexpr auto kClientOrder = std::to_array<string_view>({"net", "cli"});
 constexpr auto kSharedOrder =
     std::to_array<string_view>({"io", "geometry", "time", "camera", "scene", "wire", "render"});
