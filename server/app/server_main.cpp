@@ -21,7 +21,7 @@
 #include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
-#include "server/rpc/wearer_entrance.hpp"
+#include "server/wear/wearer_entrance.hpp"
 #include "server/store/annotation_store.hpp"
 #include "server/tracker/tracker.hpp"
 #include "shared/io/log.hpp"

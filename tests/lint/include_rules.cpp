@@ -17,7 +17,7 @@ using std::string_view;
 constexpr auto kServerOrder = std::to_array<string_view>(
     {"pipeline", "mount",    "gl",      "capture", "sim",      "features", "filter",
      "map",      "tracker",  "anchors", "gaze",    "wearable", "overlay",  "encode",
-     "store",    "identity", "rpc",     "gateway", "eval",     "app"});
+     "store",    "identity", "rpc",     "wear",    "gateway",  "eval",     "app"});
 constexpr auto kClientOrder = std::to_array<string_view>({"net", "cli"});
 constexpr auto kSharedOrder = std::to_array<string_view>(
     {"version", "io", "geometry", "time", "camera", "scene", "wire", "render"});
@@ -43,7 +43,7 @@ struct Home {
 const std::vector<Home>& Homes() {
   static const std::vector<Home> homes = {
       {"*.grpc.pb.h", {"server/rpc", "client/net"}},
-      {"*.pb.h", {"shared/wire", "server/rpc", "client/net"}},
+      {"*.pb.h", {"shared/wire", "server/rpc", "server/wear", "client/net"}},
       {"grpcpp/", {"server/rpc", "server/gateway", "server/app", "client/net"}},
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},

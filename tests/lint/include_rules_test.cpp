@@ -78,6 +78,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"server/gateway/a.cpp", "#include <saccade/v1/session.grpc.pb.h>", false},
                     Case{"shared/wire/a.cpp", "#include \"saccade/v1/session.pb.h\"", true},
                     Case{"server/encode/a.cpp", "#include \"saccade/v1/video.pb.h\"", false},
+                    Case{"server/wear/a.cpp", "#include \"saccade/v1/wearer.pb.h\"", true},
+                    Case{"server/wear/a.cpp", "#include \"saccade/v1/map.grpc.pb.h\"", false},
                     Case{"server/gateway/a.cpp", "#include <boost/beast/http.hpp>", true},
                     Case{"server/mount/a.cpp", "#include <boost/asio.hpp>", true},
                     Case{"server/rpc/a.cpp", "#include <boost/beast/http.hpp>", false},

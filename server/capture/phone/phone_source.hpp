@@ -14,7 +14,6 @@
 #include <string>
 #include <thread>
 
-#include "server/capture/phone/coded_picture.hpp"
 #include "server/capture/phone/packet_decoder.hpp"
 #include "server/capture/phone/phone_clock.hpp"
 #include "server/capture/source.hpp"

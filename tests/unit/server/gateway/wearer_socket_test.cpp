@@ -9,7 +9,7 @@
 #include "http_client.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/identity/certificate_files.hpp"
-#include "server/rpc/wearer_entrance.hpp"
+#include "server/wear/wearer_entrance.hpp"
 #include "tests/unit/server/capture/phone_fixture.hpp"
 #include "wearer_client.hpp"
 

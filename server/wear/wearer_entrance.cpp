@@ -1,4 +1,4 @@
-#include "server/rpc/wearer_entrance.hpp"
+#include "server/wear/wearer_entrance.hpp"
 
 #include <absl/strings/str_cat.h>
 
