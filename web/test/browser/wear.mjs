@@ -407,8 +407,8 @@ async function revocation({ check, phone, expert, saccade, ...context }, wearerI
     );
   const outs = [out(phone.page, '.line'), out(expert.page, 'header .status')];
   for (const [i, id] of [wearerId, pilotId].entries()) {
-    const begin = Date.now();
     saccade('revoke', id);
+    const begin = Date.now(); // revoked since just before: the command answers when it is done
     const { atMs, text } = await outs[i];
     const who = i === 0 ? 'phone' : 'expert';
     check(
