@@ -32,7 +32,7 @@ ConnectionLimits ConnectionsOf(const ServerConfig& config) {
           .unheard_of_address = counted ? limits.address_unheard : 0,
           .new_of_address = RateOf(limits, limits.address_connections_per_s),
           .this_machine = limits.this_machine,
-          .trusted_proxy = config.trusted_proxy.empty() ? "" : PeerKey(config.trusted_proxy)};
+          .trusted_proxy = PlainAddress(config.trusted_proxy)};
 }
 
 }  // namespace
@@ -53,7 +53,7 @@ void ApplyLimits(const ServerConfig& config, RpcServerOptions& options) {
 
 void ApplyLimits(const ServerConfig& config, RpcServer& rpc, GatewayOptions& options) {
   options.connections = ConnectionsOf(config);
-  options.trusted_proxy = config.trusted_proxy;
+  options.trusted_proxy = options.connections.trusted_proxy;
   options.admit = [&rpc](const std::string& address, absl::string_view authorization,
                          std::size_t bytes) -> std::optional<GatewayRefusal> {
     const absl::Status status = rpc.AdmitBrowser(address, authorization, bytes);

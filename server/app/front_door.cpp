@@ -152,9 +152,9 @@ void FrontDoor::Look(const OnNew& on_new) {
   }
   said_.clear();
   if (now->chain_pem == served_chain_) return;
-  served_chain_ = now->chain_pem;
   SayNotNamed(*now);
   on_new(*now);
+  served_chain_ = now->chain_pem;
 }
 
 FrontDoor::~FrontDoor() {

@@ -276,6 +276,9 @@ absl::Status CheckIdentity(const Raw& raw, ServerConfig& config) {
         "--client-ca: machines show certificates where there is TLS, and need to where tokens "
         "are asked for: tls.required and auth.required on loopback, no --insecure");
   }
+  if (!raw.client_roles.empty() && raw.client_ca.empty()) {
+    return Bad("client_roles: no machine shows a certificate without tls.client_ca (--client-ca)");
+  }
   config.waiting_room = raw.waiting_room;
   if (raw.waiting_room && !config.auth_required) {
     return Bad("--waiting-room: without invites everybody is in: set auth.required");

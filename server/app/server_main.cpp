@@ -21,9 +21,9 @@
 #include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
-#include "server/wear/wearer_entrance.hpp"
 #include "server/store/annotation_store.hpp"
 #include "server/tracker/tracker.hpp"
+#include "server/wear/wearer_entrance.hpp"
 #include "shared/io/log.hpp"
 #include "shared/io/regular_file.hpp"
 #include "shared/version/version.hpp"
@@ -172,7 +172,9 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   shutdown.SetPhase("opening the ports");
   absl::StatusOr<std::unique_ptr<RpcServer>> rpc = RpcServer::Start(rpc_options, **engine, hub);
   if (!rpc.ok()) return rpc.status();
-  WearerEntrance wearer((*door)->access(), phone, config.source);
+  // Its kind: the whole may hold a password.
+  const std::string other = config.source.substr(0, config.source.find(':'));
+  WearerEntrance wearer((*door)->access(), phone, other);
   tee.Connect(&wearer);
   GatewayOptions gateway_options;
   gateway_options.wearer = &wearer;

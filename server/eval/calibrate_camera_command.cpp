@@ -1,6 +1,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
+#include <unistd.h>
 
 #include <iostream>
 #include <thread>
@@ -90,6 +91,25 @@ absl::Status Collect(FrameSource& source, const BoardPattern& pattern,
   return absl::OkStatus();
 }
 
+/// Before the board is shown for minutes: whether its camera file could be written then.
+absl::Status CheckOut(const std::filesystem::path& out) {
+  if (MayExist(out)) {
+    return absl::AlreadyExistsError(
+        absl::StrCat("--out: ", out.string(), " exists; name a new file"));
+  }
+  const std::filesystem::path folder =
+      out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) {
+    return absl::NotFoundError(absl::StrCat("--out ", out.string(), ": there is no folder ",
+                                            folder.string(), "; make it"));
+  }
+  if (access(folder.c_str(), W_OK | X_OK) == 0) return absl::OkStatus();
+  return absl::PermissionDeniedError(absl::StrCat("--out ", out.string(),
+                                                  ": nothing can be written into ", folder.string(),
+                                                  "; name another folder"));
+}
+
 /// Written only if the server would read it.
 absl::Status WriteCamera(const LensReport& report, double fps, const std::filesystem::path& out) {
   CameraIntrinsics lens = report.fit.lens;
@@ -105,6 +125,12 @@ absl::Status WriteCamera(const LensReport& report, double fps, const std::filesy
         "too little to believe: the lens found is none that can be (", read.status().message(),
         "); show the board at all edges, and give --lens kannala_brandt for a fisheye"));
   }
+  if (MayExist(out)) {
+    return absl::AlreadyExistsError(absl::StrCat("--out: ", out.string(),
+                                                 " was made meanwhile and is left as it is; the "
+                                                 "camera is in ",
+                                                 draft.string()));
+  }
   std::filesystem::rename(draft, out, error);
   if (!error) return absl::OkStatus();
   return absl::NotFoundError(
@@ -114,10 +140,7 @@ absl::Status WriteCamera(const LensReport& report, double fps, const std::filesy
 }  // namespace
 
 absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments) {
-  if (MayExist(arguments.out)) {
-    return absl::AlreadyExistsError(
-        absl::StrCat("--out: ", arguments.out.string(), " exists; name a new file"));
-  }
+  if (absl::Status possible = CheckOut(arguments.out); !possible.ok()) return possible;
   const absl::StatusOr<BoardPattern> pattern = ParseBoard(arguments.board, arguments.square_m);
   if (!pattern.ok()) return pattern.status();
   const LensModel model =
@@ -132,6 +155,7 @@ absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments) {
     const std::jthread watch = signals.Watch(**source);
     if (absl::Status seen = Collect(**source, *pattern, arguments, picker); !seen.ok()) return seen;
   }
+  signals.Release();  // the fit takes minutes, and may be given up
   const absl::StatusOr<LensReport> report =
       Calibrate(arguments.source, picker, *pattern, picture, model);
   if (!report.ok()) return report.status();

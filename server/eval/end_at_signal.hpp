@@ -19,7 +19,7 @@ class EndAtSignal {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    pthread_sigmask(SIG_BLOCK, &signals_, &before_);
   }
   /// Must end before `source` does.
   std::jthread Watch(FrameSource& source) const {
@@ -31,8 +31,12 @@ class EndAtSignal {
     });
   }
 
+  /// Once the watch has ended, on the thread that made this: from here on the signals end the
+  /// program again, as nobody takes them any more.
+  void Release() const { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+
  private:
-  sigset_t signals_{};
+  sigset_t signals_{}, before_{};
 };
 
 }  // namespace saccade

@@ -188,7 +188,8 @@ class Gateway::Impl {
     if (address.is_v6() && address.to_v6().is_v4_mapped()) {
       address = net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
     }
-    if (!Welcome(address.to_string())) return;
+    const std::string caller = address.to_string();
+    if (!gate_.IsProxy(caller) && !Welcome(caller)) return;
     if (DescriptorsRunOut(socket.native_handle()) ||
         connections_.size() >= static_cast<std::size_t>(options_.connections.all)) {
       if (!CloseLongestIdle()) return;

@@ -86,9 +86,13 @@ bool BrowserConnection::Admitted() {
   if (std::exchange(admitted_, true)) return true;
   const Request& request = reader_->request();
   caller_ = peer_;
-  if (!context_.trusted_proxy.empty() && peer_ == context_.trusted_proxy) {
-    std::string told = ForwardedFor(View(request["X-Forwarded-For"]));
-    if (!told.empty()) caller_ = std::move(told);
+  if (!context_.trusted_proxy.empty() && PlainAddress(peer_) == context_.trusted_proxy) {
+    // Of several lines the last one: the proxy wrote it, the others may be anybody's.
+    for (const auto& field : request) {
+      if (!beast::iequals(field.name_string(), "X-Forwarded-For")) continue;
+      std::string told = ForwardedFor(View(field.value()));
+      caller_ = told.empty() ? peer_ : std::move(told);
+    }
   }
   if (!context_.admit) return true;
   const std::optional<GatewayRefusal> refusal =

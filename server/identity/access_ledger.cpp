@@ -102,6 +102,8 @@ absl::StatusOr<Issued> AccessLedger::Redeem(const std::string& text,
   if (row.facts.used >= row.facts.uses) return Refused("this invite has been used up");
   ++row.facts.used;
   const Token pass = NewToken('p');
+  // Also by an invite that is older than the waiting room.
+  row.facts.waits |= options_.waiting_room && row.facts.role < AccessRole::kWearer;
   const bool waits = row.facts.waits;
   const PassRow pass_row{pass.id,
                          row.facts.id,

@@ -12,8 +12,11 @@ constexpr Timestamp kAgain_ns = 5'000'000'000;  // who is slow is closed after t
 
 }  // namespace
 
+bool ConnectionGate::IsProxy(absl::string_view address) const {
+  return !limits_.trusted_proxy.empty() && PlainAddress(address) == limits_.trusted_proxy;
+}
+
 bool ConnectionGate::Counts(const std::string& peer) const {
-  if (!limits_.trusted_proxy.empty() && peer == limits_.trusted_proxy) return false;
   return limits_.this_machine || !IsThisMachine(peer);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <absl/status/status.h>
+#include <absl/strings/string_view.h>
 
 #include <string>
 
@@ -17,7 +18,7 @@ struct ConnectionLimits {
   int unheard_of_address = 64;
   RateLimit new_of_address{50, 300};  // handshakes, mostly: half a millisecond of a core each
   bool this_machine = false;          // loopback, which may be a proxy, is counted by address, too
-  std::string trusted_proxy;          // nor is this address; PeerKey; empty: none
+  std::string trusted_proxy;          // nor is this one (PlainAddress); empty: none
 };
 
 /// What is open at a port now.
@@ -31,6 +32,8 @@ class ConnectionGate {
   explicit ConnectionGate(const ConnectionLimits& limits)
       : limits_(limits), new_(limits.new_of_address) {}
 
+  /// The proxy that carries many people's calls: nothing below is asked of it.
+  bool IsProxy(absl::string_view address) const;
   /// To be asked first, as it costs least: ResourceExhausted (with the time to try again).
   absl::Status Hurry(const std::string& peer, Timestamp now_ns);
   /// Then this; `all` is the caller's to judge, who may have something to close.

@@ -11,7 +11,6 @@
 namespace saccade {
 namespace {
 
-constexpr absl::string_view kMapped = "::ffff:";
 constexpr absl::string_view kBearer = "bearer ";
 
 bool IsLiteral(const std::string& text) {
@@ -22,14 +21,21 @@ bool IsLiteral(const std::string& text) {
 
 }  // namespace
 
+std::string PlainAddress(absl::string_view address) {
+  const std::string text(address.substr(0, address.find('%')));
+  in6_addr six{};
+  if (inet_pton(AF_INET6, text.c_str(), &six) != 1) return text;
+  std::array<char, INET6_ADDRSTRLEN> plain{};
+  const bool mapped = IN6_IS_ADDR_V4MAPPED(&six);
+  const void* from = mapped ? static_cast<const void*>(&six.s6_addr[12]) : &six;
+  inet_ntop(mapped ? AF_INET : AF_INET6, from, plain.data(), plain.size());
+  return plain.data();
+}
+
 std::string PeerKey(absl::string_view address) {
-  if (absl::StartsWithIgnoreCase(address, kMapped) && absl::StrContains(address, '.')) {
-    address.remove_prefix(kMapped.size());
-  }
+  const std::string plain = PlainAddress(address);
   std::array<unsigned char, 16> bytes{};
-  if (inet_pton(AF_INET6, std::string(address).c_str(), bytes.data()) != 1) {
-    return absl::StrCat("ipv4:", address);
-  }
+  if (inet_pton(AF_INET6, plain.c_str(), bytes.data()) != 1) return absl::StrCat("ipv4:", plain);
   if (IN6_IS_ADDR_LOOPBACK(reinterpret_cast<const in6_addr*>(bytes.data()))) return "ipv6:::1";
   std::string network = "ipv6:";
   for (std::size_t i = 0; i < 8; ++i)

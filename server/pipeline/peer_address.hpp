@@ -6,6 +6,10 @@
 
 namespace saccade {
 
+/// An IP literal as the system writes it: `::ffff:192.0.2.1` is 192.0.2.1, no zone (`%eth0`), lower
+/// case. What is none: as it is.
+std::string PlainAddress(absl::string_view address);
+
 /// By what a caller is counted: "ipv4:127.0.0.1", "ipv6:2001:db8:0:1" (the first 64 bits, one
 /// household). `address` is an IP literal; an IPv4 caller of a socket for both is himself.
 std::string PeerKey(absl::string_view address);

@@ -6,6 +6,8 @@
 #include <grpc/grpc_security_constants.h>
 #include <grpcpp/security/auth_context.h>
 
+#include <iterator>
+
 #include "server/identity/role_table.hpp"
 #include "server/pipeline/peer_address.hpp"
 
@@ -16,21 +18,23 @@ namespace {
 constexpr char kPeerMetadata[] = "x-saccade-peer";
 
 std::string Metadata(const grpc::CallbackServerContext& context, const char* name) {
-  const auto at = context.client_metadata().find(name);
-  if (at == context.client_metadata().end()) return "";
-  return {at->second.data(), at->second.size()};
+  // Of several the last one: what a proxy adds, it adds behind what it was sent.
+  const auto [first, end] = context.client_metadata().equal_range(name);
+  if (first == end) return "";
+  const grpc::string_ref& last = std::prev(end)->second;
+  return {last.data(), last.size()};
 }
 
-// "ipv4:127.0.0.1:50123", "ipv6:%5B::1%5D:50123", "unix:..."
-std::string SocketPeer(const std::string& peer) {
+// "ipv4:127.0.0.1:50123", "ipv6:%5B::1%5D:50123"; of "unix:..." nothing.
+std::string SocketAddress(const std::string& peer) {
   const std::string plain = absl::StrReplaceAll(peer, {{"%5B", "["}, {"%5D", "]"}});
   const std::size_t port = plain.rfind(':');
-  if (absl::StartsWith(plain, "ipv4:") && port > 5) return PeerKey(plain.substr(5, port - 5));
+  if (absl::StartsWith(plain, "ipv4:") && port > 5) return plain.substr(5, port - 5);
   const std::size_t open = plain.find('['), close = plain.find(']');
   if (absl::StartsWith(plain, "ipv6:") && open != std::string::npos && close > open) {
-    return PeerKey(plain.substr(open + 1, close - open - 1));
+    return plain.substr(open + 1, close - open - 1);
   }
-  return plain;
+  return "";
 }
 
 std::string IdOf(const absl::StatusOr<Access>& access) { return access.ok() ? access->id : ""; }
@@ -53,10 +57,11 @@ std::string Gatekeeper::PeerOf(const Context& context) const {
     const std::string address = Metadata(context, kPeerMetadata);
     return address.empty() ? "inproc" : PeerKey(address);
   }
-  std::string peer = SocketPeer(context.peer());
-  if (trusted_proxy_.empty() || peer != trusted_proxy_) return peer;
+  const std::string caller = SocketAddress(context.peer());
+  if (caller.empty()) return context.peer();
+  if (trusted_proxy_.empty() || PlainAddress(caller) != trusted_proxy_) return PeerKey(caller);
   const std::string address = ForwardedFor(Metadata(context, "x-forwarded-for"));
-  return address.empty() ? peer : PeerKey(address);
+  return PeerKey(address.empty() ? caller : address);
 }
 
 absl::Status Gatekeeper::Arrive(const Context& context, std::size_t bytes) {

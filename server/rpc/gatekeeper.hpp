@@ -34,7 +34,8 @@ class Gatekeeper {
     RpcLimits limits;
     TrafficLimits traffic;
     MachineRoles machines;
-    std::string trusted_proxy;  // PeerKey of whose X-Forwarded-For is believed; empty: nobody's
+    std::string
+        trusted_proxy;  // PlainAddress of whose X-Forwarded-For is believed; empty: nobody's
   };
 
   /// `access` and `sessions` outlive this.

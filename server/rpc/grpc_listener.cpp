@@ -124,8 +124,9 @@ bool GrpcListener::AcceptOne() {
   const int fd = ::accept4(socket_, reinterpret_cast<sockaddr*>(&address), &size,
                            SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (fd < 0) return errno == EINTR || errno == ECONNABORTED;
-  const std::string peer = PeerKey(AddressText(address));
-  if (DescriptorsRunOut(fd) || !Welcome(fd, peer)) {
+  const std::string caller = AddressText(address);
+  const std::string peer = PeerKey(caller);
+  if (DescriptorsRunOut(fd) || !Welcome(fd, caller, peer)) {
     ::close(fd);
     return true;
   }
@@ -140,15 +141,17 @@ bool GrpcListener::AcceptOne() {
   return true;
 }
 
-bool GrpcListener::Welcome(int fd, const std::string& peer) {
+bool GrpcListener::Welcome(int fd, const std::string& caller, const std::string& peer) {
   const Timestamp now_ns = MonotonicNow();
-  absl::Status status = gate_.Hurry(peer, now_ns);
+  const bool proxy = gate_.IsProxy(caller);
+  absl::Status status = proxy ? absl::OkStatus() : gate_.Hurry(peer, now_ns);
   if (status.ok()) {
     std::erase_if(open_,
                   [fd](const Open& one) { return one.fd == fd; });  // the system gave it anew
     const ConnectionCounts counts = Count(peer, now_ns);
-    status = gate_.Admit(peer, counts);
-    if (status.ok() && counts.all >= limits_.all) {
+    if (!proxy) status = gate_.Admit(peer, counts);
+    // Whoever fills the port must not keep out who is on the machine itself, to revoke them.
+    if (status.ok() && counts.all >= limits_.all && !IsThisMachine(peer)) {
       status = absl::ResourceExhaustedError(
           absl::StrCat("connections: ", counts.all, " are open, as many as may be"));
     }

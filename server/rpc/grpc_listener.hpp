@@ -48,7 +48,7 @@ class GrpcListener {
       : socket_(socket), wake_(wake), port_(port), limits_(limits), gate_(limits) {}
   void Run();
   bool AcceptOne();
-  bool Welcome(int fd, const std::string& peer);
+  bool Welcome(int fd, const std::string& caller, const std::string& peer);
   ConnectionCounts Count(const std::string& peer, Timestamp now_ns);
 
   const int socket_;

@@ -15,6 +15,8 @@ namespace saccade {
 class HealthService final : public grpc::health::v1::Health::CallbackService {
  public:
   explicit HealthService(Gatekeeper& gate);
+  /// Ends every Watch of these passes.
+  void End(const std::vector<std::string>& access_ids, const absl::Status& why);
   /// Ends every Watch, and each that comes.
   void Stop();
 

@@ -92,6 +92,7 @@ class RpcServer::Impl {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
       hub_.End(ids, why);
+      health_service_.End(ids, why);
     });
   }
   ~Impl() {

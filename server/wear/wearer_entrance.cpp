@@ -15,8 +15,10 @@ namespace {
 
 constexpr std::size_t kMostHello = 4096, kMostMessage = (1 << 20) + 256;
 constexpr std::size_t kMostId = 64, kMostLabel = 200;
-constexpr int kMostMessages_hz = 400;  // 60 pictures and 120 samples of motion are usual
-constexpr Timestamp kHelloTakes_ns = 10'000'000'000;
+constexpr int kMostMessages_hz = 400;        // 60 pictures and 120 samples of motion are usual
+constexpr int kMostBytes_per_s = 6'000'000;  // a phone sends a twentieth of it
+constexpr Timestamp kHelloTakes_ns = 3'000'000'000;
+constexpr std::size_t kMostStrangers = 128, kMostStrangersOfPeer = 4;
 
 PacketHeader::Codec CodecOf(v1::WearerCodec codec) {
   return codec == v1::WEARER_CODEC_VP8 ? PacketHeader::kVp8 : PacketHeader::kH264;
@@ -67,20 +69,23 @@ class WearerEntrance::PhoneLinkImpl final : public PhoneLink {
 
 namespace {
 
-/// Messages of the last whole second.
+/// Messages and bytes of this second.
 class Rate {
  public:
-  bool TooMany(Timestamp now_ns) {
+  bool TooMuch(Timestamp now_ns, std::size_t bytes) {
     if (now_ns - begin_ns_ > 1'000'000'000) {
       begin_ns_ = now_ns;
       count_ = 0;
+      bytes_ = 0;
     }
-    return ++count_ > kMostMessages_hz;
+    bytes_ += bytes;
+    return ++count_ > kMostMessages_hz || bytes_ > kMostBytes_per_s;
   }
 
  private:
   Timestamp begin_ns_ = 0;
   int count_ = 0;
+  std::size_t bytes_ = 0;
 };
 
 }  // namespace
@@ -89,19 +94,23 @@ class Rate {
 class WearerEntrance::Conversation final : public WearerPort::Link {
  public:
   Conversation(WearerEntrance& entrance, const std::string& peer, std::shared_ptr<Out> out)
-      : entrance_(entrance), link_(std::make_shared<PhoneLinkImpl>(peer, std::move(out))) {}
+      : entrance_(entrance),
+        link_(std::make_shared<PhoneLinkImpl>(peer, std::move(out))),
+        stranger_(entrance.Arrive(peer)),
+        crowded_(!stranger_) {}
   ~Conversation() override {
     if (let_in_) entrance_.Leave(link_.get());
+    if (stranger_) entrance_.Depart(link_->peer());
   }
 
   std::size_t most_bytes() const override { return let_in_ ? kMostMessage : kMostHello; }
 
   void OnMessage(absl::string_view bytes) override {
-    if (link_->ended()) return;
+    if (link_->ended() || crowded_) return;
     v1::WearerUpstream message;
     const Timestamp now_ns = MonotonicNow();
-    if (rate_.TooMany(now_ns)) {
-      return link_->Refuse("too many messages: at most 400 a second are taken", false);
+    if (rate_.TooMuch(now_ns, bytes.size())) {
+      return link_->Refuse("too many messages: at most 400 and 6 MB a second are taken", false);
     }
     if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
       return link_->Refuse("a message is none of saccade.v1.WearerUpstream; load /wear anew", true);
@@ -122,6 +131,7 @@ class WearerEntrance::Conversation final : public WearerPort::Link {
 
   void OnTick() override {
     if (link_->ended()) return;
+    if (crowded_) return link_->Refuse("too many links that have not said hello yet", false);
     if (!let_in_) {
       if (MonotonicNow() - begun_ns_ > kHelloTakes_ns) link_->Refuse("no hello came", false);
       return;
@@ -144,6 +154,7 @@ class WearerEntrance::Conversation final : public WearerPort::Link {
 
   void Record(const std::string& outcome) {
     AuditFacts facts;
+    if (link_->access_id.empty()) return;  // of strangers nothing: they would fill the book
     facts.access_id = link_->access_id;
     facts.call = kWhat;
     facts.outcome = outcome;
@@ -152,6 +163,9 @@ class WearerEntrance::Conversation final : public WearerPort::Link {
 
   void OnHello(const v1::WearerHello& hello) {
     token_ = hello.token();
+    if (const auto known = entrance_.access_.Check(token_); known.ok()) {
+      link_->access_id = known->id;
+    }
     const absl::StatusOr<Access> access = May();
     if (!access.ok()) {
       Record(std::string(access.status().message()));
@@ -165,7 +179,6 @@ class WearerEntrance::Conversation final : public WearerPort::Link {
     if (hello.phone_id().size() > kMostId || hello.camera_label().size() > kMostLabel) {
       return link_->Refuse("hello: phone_id or camera_label is too long", true);
     }
-    link_->access_id = access->id;
     link_->phone_id = hello.phone_id();
     if (!entrance_.TakeOver(link_)) {
       Record("refused: another phone is the camera");
@@ -175,6 +188,7 @@ class WearerEntrance::Conversation final : public WearerPort::Link {
           false);
     }
     let_in_ = true;
+    if (std::exchange(stranger_, false)) entrance_.Depart(link_->peer());
     Record("ok");
     Log(absl::StrCat("phone ", link_->peer(), ": is the camera now (",
                      Printable(hello.camera_label()), ")"));
@@ -224,6 +238,8 @@ class WearerEntrance::Conversation final : public WearerPort::Link {
   const Timestamp begun_ns_ = MonotonicNow();
   std::string token_;
   bool let_in_ = false;
+  bool stranger_;       // counted among those without a hello
+  const bool crowded_;  // too many of them
   Timestamp last_pong_ns_ = 0;
   Rate rate_;
 };
@@ -236,6 +252,19 @@ WearerEntrance::~WearerEntrance() = default;
 std::unique_ptr<WearerPort::Link> WearerEntrance::Open(const std::string& peer,
                                                        std::shared_ptr<Out> out) {
   return std::make_unique<Conversation>(*this, peer, std::move(out));
+}
+
+bool WearerEntrance::Arrive(const std::string& peer) {
+  const std::lock_guard lock(mutex_);
+  const bool crowded =
+      strangers_.size() >= kMostStrangers || strangers_.count(peer) >= kMostStrangersOfPeer;
+  if (!crowded) strangers_.insert(peer);
+  return !crowded;
+}
+
+void WearerEntrance::Depart(const std::string& peer) {
+  const std::lock_guard lock(mutex_);
+  if (const auto found = strangers_.find(peer); found != strangers_.end()) strangers_.erase(found);
 }
 
 bool WearerEntrance::TakeOver(const std::shared_ptr<PhoneLinkImpl>& link) {

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "server/capture/phone/phone_source.hpp"
@@ -14,7 +15,8 @@ namespace saccade {
 /// Who may be the camera, over the WebSocket /wear/upstream (proto/saccade/v1/wearer.proto).
 ///
 /// A link begins with a hello that carries a token of the role wearer, which is looked at again
-/// four times a second as long as the link lasts. One phone at a time has the camera: another one
+/// ten times a second as long as the link lasts. Links without one are few and short: nobody who
+/// is not let in holds the gateway's connections. One phone at a time has the camera: another one
 /// is refused in words; the same one, by its pass and its own id, takes over from its own dead
 /// link. Whatever is malformed ends the link. Thread safe.
 class WearerEntrance final : public WearerPort {
@@ -36,12 +38,16 @@ class WearerEntrance final : public WearerPort {
   /// Makes `link` the one that has the camera. False: another phone has it.
   bool TakeOver(const std::shared_ptr<PhoneLinkImpl>& link);
   void Leave(const PhoneLinkImpl* link);
+  /// A link without a hello yet. False: there are as many as may be, and it is not counted.
+  bool Arrive(const std::string& peer);
+  void Depart(const std::string& peer);
 
   AccessBook& access_;
   PhoneSource* const source_;
   const std::string other_;
   std::mutex mutex_;
   std::shared_ptr<PhoneLinkImpl> holder_;  // guarded by mutex_; null: no phone
+  std::multiset<std::string> strangers_;   // guarded by mutex_: peers of links without a hello
 };
 
 /// Hands on what the engine tells, and the tracked frames to `entrance` as well.

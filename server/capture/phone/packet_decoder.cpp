@@ -11,12 +11,18 @@ namespace {
 
 constexpr std::chrono::milliseconds kHangs(1'000);  // for one picture
 constexpr std::chrono::milliseconds kStarting(5'000);
+constexpr int kPadding_px = 64;  // what decoders add to a side
+
+/// Twice the sides, so that the usual mistakes are still seen and said; beyond, none is decoded.
+std::int64_t MostPixels(cv::Size size) {
+  return std::int64_t{4} * (size.width + kPadding_px) * (size.height + kPadding_px);
+}
 
 }  // namespace
 
 absl::StatusOr<DecodedPacket> PacketDecoder::Decode(const CodedPicture& packet, bool anew) {
   if (packet.data.empty() || packet.data.size() > PacketHeader::kMostBytes) {
-    return DecodedPacket{packet.picture_id, {}, true};
+    return DecodedPacket{packet.picture_id, {}, true, {}};
   }
   const std::chrono::milliseconds most = process_ == nullptr ? kStarting : kHangs;
   const absl::Status asked = Ask(packet, anew, most);
@@ -32,7 +38,8 @@ absl::StatusOr<DecodedPacket> PacketDecoder::Decode(const CodedPicture& packet, 
 absl::Status PacketDecoder::Ask(const CodedPicture& packet, bool anew,
                                 std::chrono::milliseconds most) {
   if (process_ == nullptr) {
-    absl::StatusOr<std::unique_ptr<DecoderProcess>> process = DecoderProcess::StartPackets();
+    absl::StatusOr<std::unique_ptr<DecoderProcess>> process =
+        DecoderProcess::StartPackets(MostPixels(size_));
     if (!process.ok()) return process.status();
     if (std::exchange(started_, true)) ++restarts_;
     process_ = *std::move(process);
@@ -54,7 +61,7 @@ absl::StatusOr<DecodedPacket> PacketDecoder::Answer(const CodedPicture& packet,
                                                     std::chrono::milliseconds most) {
   const absl::StatusOr<DecodeHeader> header = process_->ReadHeader(stopped_, most);
   if (!header.ok()) return header.status();
-  DecodedPacket decoded{packet.picture_id, {}, header->bad > bad_of_process_};
+  DecodedPacket decoded{packet.picture_id, {}, header->bad > bad_of_process_, {}};
   bad_of_process_ = header->bad;
   if (header->kind == DecodeHeader::kAlive) return decoded;
   if (header->kind == DecodeHeader::kError) {
@@ -65,10 +72,18 @@ absl::StatusOr<DecodedPacket> PacketDecoder::Answer(const CodedPicture& packet,
   const bool fits = header->kind == DecodeHeader::kFrame && header->width <= kMaxPictureSide_px &&
                     header->height <= kMaxPictureSide_px && (colour || header->channels == 1) &&
                     header->size == std::size_t{header->width} * header->height * header->channels;
-  if (!fits) return absl::UnavailableError("the decoder writes nonsense");
+  const cv::Size came(static_cast<int>(header->width), static_cast<int>(header->height));
+  if (!fits || std::int64_t{came.width} * came.height > MostPixels(size_)) {
+    return absl::UnavailableError("the decoder writes nonsense");
+  }
+  if (came != size_ && came != cv::Size(size_.height, size_.width)) {
+    const absl::Status skipped = process_->SkipBytes(header->size, stopped_);
+    if (!skipped.ok()) return skipped;
+    decoded.refused = came;
+    return decoded;
+  }
   try {
-    decoded.pixels.create(static_cast<int>(header->height), static_cast<int>(header->width),
-                          colour ? CV_8UC3 : CV_8UC1);
+    decoded.pixels.create(came, colour ? CV_8UC3 : CV_8UC1);
   } catch (const std::exception&) {
     return absl::ResourceExhaustedError("there is no memory for a picture");
   }

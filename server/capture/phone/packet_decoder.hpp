@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "server/capture/decode_protocol.hpp"
 #include "server/capture/video/decoder_process.hpp"
@@ -26,7 +27,8 @@ struct CodedPicture {
   Timestamp capture_ns = 0;  // the phone's clock
   int clockwise_deg = 0;     // 0, 90, 180 or 270: what turns it to lie as its sensor does
   std::string data;
-  Timestamp received_ns = 0;  // MonotonicNow() when it was whole in memory
+  Timestamp received_ns = 0;     // MonotonicNow() when it was whole in memory
+  std::uint64_t generation = 0;  // PhoneSource's: of which Begin() its link is
 };
 
 /// What came of one packet.
@@ -34,13 +36,16 @@ struct DecodedPacket {
   std::uint64_t picture_id = 0;
   cv::Mat pixels;        // CV_8UC3 BGR or CV_8UC1; empty: none came of it
   bool damaged = false;  // what follows is of no use before the next key frame
+  cv::Size refused;      // what came is of this size, another one than wanted: no pixels
 };
 
 /// Coded pictures to pictures, one out for one in, by a saccade-decode of its own: the bytes come
 /// from outside. One thread, but for decoder_pid().
 class PacketDecoder {
  public:
-  explicit PacketDecoder(std::function<bool()> stopped) : stopped_(std::move(stopped)) {}
+  /// Of pictures of `size`, or of it with its sides swapped.
+  PacketDecoder(cv::Size size, std::function<bool()> stopped)
+      : size_(size), stopped_(std::move(stopped)) {}
 
   /// `anew`: forget what came before. After an error the next one is decoded by a new process, from
   /// its key frame on:
@@ -55,6 +60,7 @@ class PacketDecoder {
   absl::Status Ask(const CodedPicture& packet, bool anew, std::chrono::milliseconds most);
   absl::StatusOr<DecodedPacket> Answer(const CodedPicture& packet, std::chrono::milliseconds most);
 
+  const cv::Size size_;
   const std::function<bool()> stopped_;
   std::unique_ptr<DecoderProcess> process_;  // null: to be started
   std::atomic<pid_t> pid_ = 0;

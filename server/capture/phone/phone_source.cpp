@@ -5,6 +5,7 @@
 #include <absl/strings/str_split.h>
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -21,6 +22,7 @@ namespace {
 
 constexpr Timestamp kAskAgain_ns = 250'000'000;
 constexpr Timestamp kTellAgain_ns = 5'000'000'000;
+constexpr std::chrono::milliseconds kRetry(250), kMostRetry(4'000);
 constexpr Timestamp kMotionKept_ns = 2'000'000'000;
 constexpr std::size_t kPicturesKept = 64, kMotionMost = 400;
 constexpr int kLeastSide_px = 160, kMostSide_px = 1920;
@@ -48,6 +50,11 @@ absl::Status CheckLive(const std::string& uri, const SourceOptions& options) {
   if (options.realtime) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat("source ", uri, ": a phone waits for nobody: leave --speed max out"));
+}
+
+std::string OfAnotherSize(cv::Size came, cv::Size taken) {
+  return absl::StrCat("pictures of ", came.width, "x", came.height, " came, and this server takes ",
+                      taken.width, "x", taken.height);
 }
 
 }  // namespace
@@ -88,7 +95,7 @@ absl::StatusOr<std::unique_ptr<PhoneSource>> PhoneSource::Open(absl::string_view
 }
 
 PhoneSource::PhoneSource(SourceInfo info, cv::Size size)
-    : info_(std::move(info)), size_(size), decoder_([this] { return frames_.stopped(); }) {
+    : info_(std::move(info)), size_(size), decoder_(size, [this] { return frames_.stopped(); }) {
   reader_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
@@ -105,11 +112,13 @@ void PhoneSource::Stop() {
 void PhoneSource::Begin(std::shared_ptr<PhoneLink> link) {
   const std::lock_guard lock(mutex_);
   link_ = std::move(link);
+  ++generation_;
   waiting_.clear();
   pictures_.clear();
   motion_.clear();
   needs_key_ = true;
   asked_ns_ = MonotonicNow();  // it begins with one
+  told_ns_ = 0;
   counts_ = {};
   clock_.Reset();
 }
@@ -132,6 +141,7 @@ void PhoneSource::Offer(const PhoneLink* link, CodedPicture picture) {
     needs_key_ = needs_key_ || !waiting_.empty();
     waiting_.clear();
   }
+  picture.generation = generation_;
   waiting_.push_back(std::move(picture));
   changed_.notify_all();
 }
@@ -186,8 +196,8 @@ void PhoneSource::Run(const std::stop_token& stop) {
     try {
       Decode(*packet, stop);
     } catch (const std::exception& e) {  // no memory
-      Log(absl::StrCat("phone: a picture cannot be kept (", e.what(), ")"));
-      NeedKeyFrame();
+      LogSeldom(absl::StrCat("phone: a picture cannot be kept (", e.what(), ")"));
+      NeedKeyFrame(packet->generation);
     }
   }
 }
@@ -216,28 +226,48 @@ std::optional<CodedPicture> PhoneSource::Take(const std::stop_token& stop) {
   return std::nullopt;
 }
 
+void PhoneSource::WaitAfterDeath(const std::stop_token& stop) {
+  retry_ = std::clamp(2 * retry_, kRetry, kMostRetry);
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, stop, retry_, [] { return false; });
+}
+
+void PhoneSource::LogSeldom(const std::string& text) {
+  const Timestamp now_ns = MonotonicNow();
+  if (logged_ns_ != 0 && now_ns - logged_ns_ < kTellAgain_ns) return;
+  logged_ns_ = now_ns;
+  Log(text);
+}
+
 void PhoneSource::Decode(const CodedPicture& packet, const std::stop_token& stop) {
+  // Another phone, or a page that was loaded anew: both count from 1 again.
+  if (!sent_.empty() && sent_.back().generation != packet.generation) sent_.clear();
   sent_.push_back({packet.picture_id, packet.codec, packet.key_frame, packet.capture_ns,
-                   packet.clockwise_deg, "", packet.received_ns});
+                   packet.clockwise_deg, "", packet.received_ns, packet.generation});
   if (sent_.size() > kMostWaiting) sent_.pop_front();
   absl::StatusOr<DecodedPacket> decoded = decoder_.Decode(packet, anew_);
   if (stop.stop_requested()) return;
   if (!decoded.ok()) {
-    Log(absl::StrCat("phone: ", decoded.status().message(), "; decoding goes on with a new one"));
-    return NeedKeyFrame();
+    if (absl::IsCancelled(decoded.status())) return;
+    LogSeldom(
+        absl::StrCat("phone: ", decoded.status().message(), "; decoding goes on with a new one"));
+    NeedKeyFrame(packet.generation);
+    return WaitAfterDeath(stop);
+  }
+  if (!decoded->refused.empty()) {
+    return NeedKeyFrame(packet.generation, OfAnotherSize(decoded->refused, size_));
   }
   if (decoded->pixels.empty() && !decoded->damaged) return;  // its picture comes with the next one
-  const auto facts = std::find_if(sent_.begin(), sent_.end(), [&](const CodedPicture& sent) {
+  const auto facts = std::find_if(sent_.rbegin(), sent_.rend(), [&](const CodedPicture& sent) {
     return sent.picture_id == decoded->picture_id;
   });
-  if (decoded->pixels.empty() || facts == sent_.end()) return NeedKeyFrame();
+  if (decoded->pixels.empty() || facts == sent_.rend()) return NeedKeyFrame(packet.generation);
   if (!Lay(*facts, decoded->pixels)) {
-    return NeedKeyFrame(absl::StrCat("pictures of ", decoded->pixels.cols, "x",
-                                     decoded->pixels.rows, " came, and this server takes ",
-                                     size_.width, "x", size_.height));
+    return NeedKeyFrame(packet.generation, OfAnotherSize(decoded->pixels.size(), size_));
   }
+  if (!decoded->damaged) retry_ = std::chrono::milliseconds(0);
   Deliver(*facts, std::move(decoded->pixels), stop);
-  if (decoded->damaged) NeedKeyFrame();
+  if (decoded->damaged) NeedKeyFrame(packet.generation);
 }
 
 bool PhoneSource::Lay(const CodedPicture& packet, cv::Mat& pixels) const {
@@ -260,6 +290,7 @@ void PhoneSource::Deliver(const CodedPicture& packet, cv::Mat pixels, const std:
   frame.camera = info_.camera;
   {
     const std::lock_guard lock(mutex_);
+    if (packet.generation != generation_) return;  // of the phone before
     frame.id = next_id_++;
     const std::optional<Timestamp> time_ns =
         clock_.ToMonotonic(packet.capture_ns, packet.received_ns);
@@ -276,12 +307,13 @@ void PhoneSource::Deliver(const CodedPicture& packet, cv::Mat pixels, const std:
   frames_.Put(std::move(frame), stop);
 }
 
-void PhoneSource::NeedKeyFrame(const std::string& problem) {
+void PhoneSource::NeedKeyFrame(std::uint64_t generation, const std::string& problem) {
   std::shared_ptr<PhoneLink> link;
   bool ask = false, tell = false;
   {
     const std::lock_guard lock(mutex_);
     ++bad_;
+    if (generation != generation_) return;  // of the phone before: this one begins anew anyway
     ++counts_.bad;
     needs_key_ = true;
     link = link_;
@@ -291,7 +323,7 @@ void PhoneSource::NeedKeyFrame(const std::string& problem) {
     if (ask) asked_ns_ = now_ns;
     if (tell) told_ns_ = now_ns;
   }
-  if (tell) Log(absl::StrCat("phone: ", problem));
+  if (tell) LogSeldom(absl::StrCat("phone: ", problem));
   if (link && tell) link->Problem(problem);
   if (link && ask) link->WantKeyFrame();
 }

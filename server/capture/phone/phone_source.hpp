@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -99,12 +100,17 @@ class PhoneSource final : public FrameSource {
   // The decoding thread.
   void Run(const std::stop_token& stop);
   std::optional<CodedPicture> Take(const std::stop_token& stop);
+  /// A decoder died: the next one is not started at once, and later each time.
+  void WaitAfterDeath(const std::stop_token& stop);
+  /// Once in a while: a phone is not to fill the log.
+  void LogSeldom(const std::string& text);
   void Decode(const CodedPicture& packet, const std::stop_token& stop);
   /// Upright as the sensor; false: of another size.
   bool Lay(const CodedPicture& packet, cv::Mat& pixels) const;
   void Deliver(const CodedPicture& packet, cv::Mat pixels, const std::stop_token& stop);
-  /// Nothing is decoded before the next key frame, which is asked for.
-  void NeedKeyFrame(const std::string& problem = "");
+  /// Nothing is decoded before the next key frame, which is asked for; unless another phone has
+  /// begun since `generation`.
+  void NeedKeyFrame(std::uint64_t generation, const std::string& problem = "");
 
   const SourceInfo info_;
   const cv::Size size_;
@@ -113,6 +119,7 @@ class PhoneSource final : public FrameSource {
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::shared_ptr<PhoneLink> link_;  // guarded by mutex_, as what follows; null: no phone
+  std::uint64_t generation_ = 0;     // Begin()s so far: what is of an earlier one is left out
   std::deque<CodedPicture> waiting_;
   bool needs_key_ = true;
   Timestamp asked_ns_ = 0, told_ns_ = 0;
@@ -124,7 +131,9 @@ class PhoneSource final : public FrameSource {
 
   PacketDecoder decoder_;  // the decoding thread's
   bool anew_ = true;
-  std::deque<CodedPicture> sent_;  // to the decoder, without their bytes
+  std::deque<CodedPicture> sent_;       // to the decoder, of one generation, without their bytes
+  std::chrono::milliseconds retry_{0};  // waited after the last death; 0: a good picture came since
+  Timestamp logged_ns_ = 0;
   FrameQueue frames_{Pace::kNewest, 1};
   std::jthread reader_;  // last: joins before the rest goes
 };

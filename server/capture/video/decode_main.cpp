@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -20,7 +21,7 @@ namespace {
 
 constexpr char kHelp[] =
     "usage: saccade-decode [--after NS] < VIDEO | saccade-decode --url rtsp://HOST[:PORT]/PATH\n"
-    "       saccade-decode --packets < PACKETS\n"
+    "       saccade-decode --packets [--most-pixels N] < PACKETS\n"
     "       saccade-decode --try-sandbox [--network] | --version\n"
     "Decodes a video and writes its pictures to standard output, in a form of its own.\n"
     "saccade-server starts it for file:, rtsp: and phone: sources.\n";
@@ -52,6 +53,7 @@ std::string WithAddress(const std::string& url) {
 int Main(int argc, char** argv) {
   DecodeRequest request;
   bool attempt = false, network = false, packets = false;
+  std::int64_t most_pixels = kMostPacketPixels;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     const bool has_value = i + 1 < argc;
@@ -63,6 +65,8 @@ int Main(int argc, char** argv) {
       attempt = true;
     } else if (word == "--packets") {
       packets = true;
+    } else if (word == "--most-pixels" && has_value) {
+      most_pixels = std::atoll(argv[++i]);
     } else if (word == "--network") {
       network = true;
     } else if (word == "--version") {
@@ -80,7 +84,7 @@ int Main(int argc, char** argv) {
     const std::string tried = TrySandbox();
     return write(1, tried.data(), tried.size()) < 0 ? 1 : 0;
   }
-  if (problem.empty()) return packets ? DecodePackets() : DecodeVideo(request);
+  if (problem.empty()) return packets ? DecodePackets(most_pixels) : DecodeVideo(request);
   WriteError("the decoder's sandbox cannot be had: " + problem);
   return 1;
 }

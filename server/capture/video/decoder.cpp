@@ -154,7 +154,7 @@ class Decoder {
     }
   }
 
-  /// Every frame that is ready. False: nobody reads any more.
+  /// Every frame that is ready. False: as SendFrame.
   bool Drain() {
     AVFrame* frame = av_frame_alloc();
     bool read = true;
@@ -187,6 +187,7 @@ class Decoder {
     return time_ns;
   }
 
+  /// False: nobody reads any more, or it cannot be written and that was said.
   bool SendFrame(const AVFrame& frame) {
     const std::int64_t time_ns = TimeOf(frame);
     if (time_ns <= last_ns_) {  // no time goes backwards
@@ -200,7 +201,10 @@ class Decoder {
     }
     header.time_ns = time_ns;
     header.bad = bad_;
-    return writer_.SendFrame(frame, header);
+    const std::string refusal = writer_.Prepare(frame);
+    if (refusal.empty()) return writer_.SendFrame(frame, header);
+    WriteError(refusal);
+    return false;
   }
 
   const DecodeRequest request_;

@@ -23,6 +23,7 @@ namespace {
 constexpr int kLookForStop_ms = 100;
 constexpr std::chrono::milliseconds kMostBytesTake(5'000);
 constexpr std::size_t kMostText = 4'000;
+constexpr std::size_t kSkippedAtOnce = 1 << 16;
 constexpr int kPipeBytes = 1 << 20;
 
 absl::StatusOr<int> OpenVideoFile(const std::filesystem::path& file) {
@@ -112,14 +113,16 @@ absl::StatusOr<Spawned> SpawnDecoder(const std::vector<std::string>& words, int 
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::StartPackets() {
+absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::StartPackets(
+    std::int64_t most_pixels) {
   int ends[2] = {-1, -1};
   // Not a pipe: to write to one that nobody reads any more is a signal.
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
     return absl::ResourceExhaustedError(
         absl::StrCat("saccade-decode: no socket to it (", std::strerror(errno), ")"));
   }
-  const absl::StatusOr<Spawned> spawned = SpawnDecoder({"saccade-decode", "--packets"}, ends[1]);
+  const absl::StatusOr<Spawned> spawned = SpawnDecoder(
+      {"saccade-decode", "--packets", "--most-pixels", absl::StrCat(most_pixels)}, ends[1]);
   close(ends[1]);
   if (spawned.ok()) {
     return std::unique_ptr<DecoderProcess>(
@@ -186,12 +189,11 @@ absl::Status DecoderProcess::Read(void* out, std::size_t size, const std::functi
     pollfd wait_for{pipe_, POLLIN, 0};
     const int ready = poll(&wait_for, 1, kLookForStop_ms);
     if (stopped()) return absl::CancelledError("");
-    if (ready <= 0) {
-      if (std::chrono::steady_clock::now() > end) {
-        return absl::DeadlineExceededError("the decoder has said nothing for too long");
-      }
-      continue;
+    // Also while a little comes now and then: nobody may hold this thread so.
+    if (std::chrono::steady_clock::now() > end) {
+      return absl::DeadlineExceededError("the decoder has not answered for too long");
     }
+    if (ready <= 0) continue;
     const ssize_t got = read(pipe_, at, size);
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return Death();
@@ -210,12 +212,10 @@ absl::Status DecoderProcess::Write(const void* data, std::size_t size,
     pollfd wait_for{input_, POLLOUT, 0};
     const int ready = poll(&wait_for, 1, kLookForStop_ms);
     if (stopped()) return absl::CancelledError("");
-    if (ready <= 0) {
-      if (std::chrono::steady_clock::now() > end) {
-        return absl::DeadlineExceededError("the decoder takes nothing for too long");
-      }
-      continue;
+    if (std::chrono::steady_clock::now() > end) {
+      return absl::DeadlineExceededError("the decoder has not taken its input for too long");
     }
+    if (ready <= 0) continue;
     const ssize_t sent = send(input_, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (sent < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (sent <= 0) return Death();
@@ -238,6 +238,19 @@ absl::StatusOr<DecodeHeader> DecoderProcess::ReadHeader(const std::function<bool
 absl::Status DecoderProcess::ReadBytes(void* out, std::size_t size,
                                        const std::function<bool()>& stopped) {
   return Read(out, size, stopped, kMostBytesTake);
+}
+
+absl::Status DecoderProcess::SkipBytes(std::size_t size, const std::function<bool()>& stopped) {
+  const auto end = std::chrono::steady_clock::now() + kMostBytesTake;
+  std::vector<char> part(std::min(size, kSkippedAtOnce));
+  while (size > 0) {
+    const std::size_t next = std::min(size, part.size());
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        end - std::chrono::steady_clock::now());
+    if (absl::Status read = Read(part.data(), next, stopped, left); !read.ok()) return read;
+    size -= next;
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::string> DecoderProcess::ReadText(const DecodeHeader& header,

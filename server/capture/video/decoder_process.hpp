@@ -31,14 +31,15 @@ class DecoderProcess {
   ///   ResourceExhausted   no descriptor or no process is to be had
   static absl::StatusOr<std::unique_ptr<DecoderProcess>> Start(const VideoInput& input,
                                                                std::int64_t after_ns);
-  /// One that decodes what Write() gives it, packet by packet (PacketHeader).
-  static absl::StatusOr<std::unique_ptr<DecoderProcess>> StartPackets();
+  /// One that decodes what Write() gives it, packet by packet (PacketHeader); pictures of more than
+  /// `most_pixels` are bad ones.
+  static absl::StatusOr<std::unique_ptr<DecoderProcess>> StartPackets(std::int64_t most_pixels);
   ~DecoderProcess();
 
   pid_t pid() const { return pid_; }
   /// The next message without what follows it; that is ReadBytes' to fetch, all of it.
   ///   Cancelled         `stopped` says so (asked every tenth of a second)
-  ///   DeadlineExceeded  nothing came for so long
+  ///   DeadlineExceeded  it has not come whole in this time
   ///   Aborted           somebody has killed the child
   ///   Unavailable       it has died by itself, or writes nonsense: says how
   absl::StatusOr<DecodeHeader> ReadHeader(const std::function<bool()>& stopped,
@@ -47,6 +48,8 @@ class DecoderProcess {
   absl::Status Write(const void* data, std::size_t size, const std::function<bool()>& stopped,
                      std::chrono::milliseconds most);
   absl::Status ReadBytes(void* out, std::size_t size, const std::function<bool()>& stopped);
+  /// The same, of bytes that nobody wants.
+  absl::Status SkipBytes(std::size_t size, const std::function<bool()>& stopped);
   /// The text of a kInfo or kError, fit for a log.
   absl::StatusOr<std::string> ReadText(const DecodeHeader& header,
                                        const std::function<bool()>& stopped);

@@ -30,6 +30,8 @@ bool ReadAll(void* data, std::size_t size) {
 
 class PacketLoop {
  public:
+  explicit PacketLoop(std::int64_t most_pixels) : most_pixels_(most_pixels) {}
+
   int Run() {
     av_log_set_level(AV_LOG_QUIET);
     packet_ = av_packet_alloc();
@@ -54,8 +56,10 @@ class PacketLoop {
     bool answered = false;
     if (avcodec_send_packet(codec_, packet_) < 0) ++bad_;
     while (avcodec_receive_frame(codec_, frame_) == 0) {
-      const bool damaged =
-          frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0;
+      // What cannot be written ends nothing: whoever sends it would have decoders started by it.
+      const bool damaged = frame_->decode_error_flags != 0 ||
+                           (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 ||
+                           !writer_.Prepare(*frame_).empty();
       if (damaged) ++bad_;
       DecodeHeader picture;
       picture.time_ns = frame_->pts;
@@ -89,13 +93,14 @@ class PacketLoop {
     codec_->thread_count = 1;  // the sandbox has no threads
     codec_->flags |= AV_CODEC_FLAG_LOW_DELAY;
     codec_->err_recognition = AV_EF_EXPLODE | AV_EF_BITSTREAM | AV_EF_BUFFER;
-    codec_->max_pixels = std::int64_t{1} << 25;
+    codec_->max_pixels = most_pixels_;
     const int error = avcodec_open2(codec_, decoder, nullptr);
     if (error == 0) return true;
     WriteError("it cannot be decoded: " + AvWords(error));
     return false;
   }
 
+  const std::int64_t most_pixels_;
   AVCodecContext* codec_ = nullptr;
   std::uint32_t of_ = 0;
   AVPacket* packet_ = nullptr;
@@ -106,9 +111,9 @@ class PacketLoop {
 
 }  // namespace
 
-int DecodePackets() {
+int DecodePackets(std::int64_t most_pixels) {
   // Ends with the process: nothing is worth freeing.
-  return (new PacketLoop())->Run();
+  return (new PacketLoop(most_pixels))->Run();
 }
 
 }  // namespace saccade

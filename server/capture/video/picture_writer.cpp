@@ -26,9 +26,9 @@ bool WriteAll(const void* data, std::size_t size) {
   return true;
 }
 
-bool Fail(const std::string& why) {
-  WriteError(why);
-  return false;
+bool IsGrey(AVPixelFormat format) {
+  const AVPixFmtDescriptor* described = av_pix_fmt_desc_get(format);
+  return described != nullptr && described->nb_components == 1;
 }
 
 }  // namespace
@@ -54,16 +54,18 @@ std::string AvWords(int error) {
   return text;
 }
 
-bool PictureWriter::SendFrame(const AVFrame& frame, DecodeHeader header) {
-  if (frame.width > kMostSide_px || frame.height > kMostSide_px) return Fail("it is too large");
+std::string PictureWriter::Prepare(const AVFrame& frame) {
+  if (frame.width > kMostSide_px || frame.height > kMostSide_px) return "it is too large";
   const auto format = static_cast<AVPixelFormat>(frame.format);
-  const AVPixFmtDescriptor* described = av_pix_fmt_desc_get(format);
-  const bool grey = described != nullptr && described->nb_components == 1;
-  const AVPixelFormat wanted = grey ? AV_PIX_FMT_GRAY8 : AV_PIX_FMT_BGR24;
+  const AVPixelFormat wanted = IsGrey(format) ? AV_PIX_FMT_GRAY8 : AV_PIX_FMT_BGR24;
   scaler_ =
       sws_getCachedContext(scaler_, frame.width, frame.height, format, frame.width, frame.height,
                            wanted, SWS_BICUBIC | SWS_ACCURATE_RND, nullptr, nullptr, nullptr);
-  if (scaler_ == nullptr) return Fail("its pixel format is not read");
+  return scaler_ == nullptr ? "its pixel format is not read" : "";
+}
+
+bool PictureWriter::SendFrame(const AVFrame& frame, DecodeHeader header) {
+  const bool grey = IsGrey(static_cast<AVPixelFormat>(frame.format));
   const int* source = sws_getCoefficients(frame.colorspace);
   sws_setColorspaceDetails(scaler_, source, frame.color_range == AVCOL_RANGE_JPEG,
                            sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, 1 << 16, 1 << 16);

@@ -25,8 +25,9 @@ std::string AvWords(int error);
 /// Decoded pictures, as BGR or grey, to standard output. Lives as long as the process.
 class PictureWriter {
  public:
-  /// Fills in the rest of `header`. False: nobody reads any more, or it cannot be written and that
-  /// was said.
+  /// Before each SendFrame: why `frame` cannot be written; empty: it can.
+  std::string Prepare(const AVFrame& frame);
+  /// Fills in the rest of `header`. False: nobody reads any more.
   bool SendFrame(const AVFrame& frame, DecodeHeader header);
 
  private:

@@ -16,6 +16,16 @@
 namespace saccade {
 namespace {
 
+/// As people are told it: every viewer reads the source's name, so without user and password.
+std::string WithoutUser(std::string uri) {
+  const std::size_t begin = uri.find("//");
+  if (begin == std::string::npos) return uri;
+  const std::size_t end = uri.find('/', begin + 2);
+  const std::size_t at = uri.rfind('@', end);
+  if (at == std::string::npos || at < begin) return uri;
+  return uri.erase(begin + 2, at + 1 - (begin + 2));
+}
+
 absl::StatusOr<std::unique_ptr<VideoSource>> Open(VideoRequest request, std::string uri,
                                                   const SourceOptions& options) {
   if (options.fps) {
@@ -101,7 +111,7 @@ absl::StatusOr<std::unique_ptr<VideoSource>> OpenRtsp(absl::string_view rest,
   VideoRequest request;
   request.pace = Pace::kNewest;
   request.input.url = uri;
-  return Open(std::move(request), uri, options);
+  return Open(std::move(request), WithoutUser(uri), options);
 }
 
 }  // namespace saccade

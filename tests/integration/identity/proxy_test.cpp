@@ -38,6 +38,8 @@ TEST(TrustedProxy, EachWhomItBringsHasLimitsOfTheirOwn) {
   EXPECT_EQ(PageFor(server, "203.0.113.8").http_status, 200) << "somebody else";
   EXPECT_EQ(PageFor(server, "203.0.113.99, 203.0.113.7").http_status, 429)
       << "what the proxy did not write itself is anybody's";
+  EXPECT_EQ(PageFor(server, "127.0.0.1\r\nX-Forwarded-For: 203.0.113.7").http_status, 429)
+      << "nor is a line before the proxy's";
   for (int i = 0; i < 5; ++i) EXPECT_EQ(PageFor(server, "").http_status, 200) << "the proxy itself";
   EXPECT_EQ(GetAccessFor(server, "203.0.113.9"), 0);
   EXPECT_EQ(GetAccessFor(server, "203.0.113.9"), 8);

@@ -35,7 +35,7 @@ class Rtsp : public ::testing::Test {
   absl::StatusOr<std::unique_ptr<VideoSource>> Open() {
     SourceOptions options;
     options.realtime = true;
-    return OpenRtsp("//localhost:" + port_ + "/cam", options);
+    return OpenRtsp("//ada:secret@localhost:" + port_ + "/cam", options);
   }
 
   std::unique_ptr<Process> server_;
@@ -46,6 +46,7 @@ TEST_F(Rtsp, LiveFramesComeOnTheMonotonicClockAndOutliveTheirDecoder) {
   const auto source = Open();
   ASSERT_TRUE(source.ok()) << source.status();
   EXPECT_EQ((*source)->info().camera->width(), 320);
+  EXPECT_EQ((*source)->info().uri, "rtsp://localhost:" + port_ + "/cam") << "everybody reads it";
   std::vector<Timestamp> times;
   for (int i = 0; i < 90; ++i) {
     const auto frame = (*source)->Next();

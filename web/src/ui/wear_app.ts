@@ -39,6 +39,7 @@ export class WearApp {
   private pose: Pose | undefined;
   private trackedMs = 0;
   private started = false;
+  private watchesMotion = false;
   private readonly latency = new WearMeter();
   private readonly rate = new RateMeter();
 
@@ -75,9 +76,16 @@ export class WearApp {
   private async begin(): Promise<void> {
     this.started = true;
     void this.stayAwake();
-    const motion = watchMotion((sample) => this.uplink?.sendMotion(sample));
+    const motion = this.watchMotion();
     await this.openCamera();
     await motion;
+  }
+
+  /** Once, whatever is tapped again; after a refusal, asks again. */
+  private async watchMotion(): Promise<void> {
+    if (this.watchesMotion) return;
+    this.watchesMotion = true; // before it has answered: taps are quick
+    this.watchesMotion = await watchMotion((sample) => this.uplink?.sendMotion(sample));
   }
 
   private async openCamera(): Promise<void> {

@@ -11,11 +11,15 @@ interface AsksFirst {
   requestPermission?: () => Promise<string>;
 }
 
-/** Asks where a phone wants to be asked (iOS), which takes a tap; then `sink` hears of each sample. */
-export async function watchMotion(sink: (motion: Motion) => void): Promise<void> {
-  if (typeof DeviceMotionEvent === 'undefined') return;
+/**
+ * Asks where a phone wants to be asked (iOS), which takes a tap; then `sink` hears of each sample,
+ * for as long as the page is there. False: it may not.
+ */
+export async function watchMotion(sink: (motion: Motion) => void): Promise<boolean> {
+  if (typeof DeviceMotionEvent === 'undefined') return false;
   const { requestPermission } = DeviceMotionEvent as unknown as AsksFirst;
-  if (requestPermission && (await requestPermission().catch(() => 'denied')) !== 'granted') return;
+  if (requestPermission && (await requestPermission().catch(() => 'denied')) !== 'granted')
+    return false;
   let lastMs = -Infinity;
   window.addEventListener('devicemotion', (event) => {
     const motion = motionOf(event, performance.timeOrigin);
@@ -23,6 +27,7 @@ export async function watchMotion(sink: (motion: Motion) => void): Promise<void>
     lastMs = motion.timeMs;
     sink(motion);
   });
+  return true;
 }
 
 /** Undefined where the phone has no such sensors: then browsers send one event without values. */

@@ -179,6 +179,7 @@ export class Uplink {
         this.options.events.keyFrameWanted();
         break;
       case 'tracked':
+        this.problem = ''; // they are of use again
         this.options.events.tracked(message.value, this.heardMs);
         break;
       case 'pong':

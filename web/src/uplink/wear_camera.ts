@@ -138,6 +138,9 @@ export class WearCamera {
     this.codecWords = 'choosing';
     const choice = await chooseCodec(this.size);
     if (!choice) {
+      this.codecWords = ''; // "Start again" chooses again
+      this.stream?.stop(); // or each of its pictures would
+      this.stream = undefined;
       this.state = {
         kind: 'failed',
         reason:

@@ -429,6 +429,8 @@ describe('Uplink', () => {
     expect(events.tracked).toHaveBeenCalledOnce();
     expect(events.keyFrameWanted).toHaveBeenCalledOnce();
     expect(uplink.problem).toMatch(/3x2/);
+    newest().say({ message: { case: 'tracked', value: { pictureId: 10n } } });
+    expect(uplink.problem).toBe('');
     uplink.stop();
   });
 });

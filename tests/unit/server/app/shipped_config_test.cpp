@@ -56,7 +56,7 @@ TEST(ShippedConfig, LinesWithANumberSignAreTheDefaults) {
   EXPECT_EQ(all.tls_required, shipped_config.tls_required);
   EXPECT_EQ(all.auth_required, shipped_config.auth_required);
   EXPECT_EQ(all.video_bit_rate_bit_s, shipped_config.video_bit_rate_bit_s);
-  EXPECT_EQ(all.limits_scale, shipped_config.limits_scale);
+  EXPECT_EQ(all.limits.scale, shipped_config.limits.scale);
   TrackerOptions tracker;
   EXPECT_TRUE(tracker.LoadToml(file).ok());
   GazeOptions gaze;

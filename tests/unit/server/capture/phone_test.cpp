@@ -220,6 +220,12 @@ TEST(PhoneSource, PicturesOfAnotherSizeAreRefusedInWords) {
   ASSERT_TRUE(Soon([&] { return !phone->problem().empty(); }));
   EXPECT_EQ(phone->problem(), "pictures of 640x480 came, and this server takes 320x240");
   EXPECT_EQ(source->bad_frames(), 1u);
+  // The next phone is told as soon, and the decoder was harmed by neither.
+  const auto second = std::make_shared<FakePhone>(cv::Size(640, 480));
+  source->Begin(second);
+  source->Offer(second.get(), second->Code(1, true));
+  ASSERT_TRUE(Soon([&] { return !second->problem().empty(); }));
+  EXPECT_EQ(source->decoder_restarts(), 0u);
 }
 
 TEST(PhoneSource, AnotherLinkGoesOnAndTheOldOneIsNotHeard) {
@@ -238,6 +244,20 @@ TEST(PhoneSource, AnotherLinkGoesOnAndTheOldOneIsNotHeard) {
   source->End(first.get());  // late: it has it no more
   source->Offer(second.get(), second->Code(4, false));
   EXPECT_EQ(NumberIn(NextOf(*source).grey), 4);
+}
+
+TEST(PhoneSource, AReloadedPageCountsAnewAndIsNotTakenForItsOldSelf) {
+  const auto source = OpenPhone();
+  const auto before = std::make_shared<FakePhone>(), after = std::make_shared<FakePhone>();
+  source->Begin(before);
+  source->Offer(before.get(), before->Code(1, true));
+  NextOf(*source);
+  source->Begin(after);
+  const CodedPicture again = after->Code(1, true);
+  source->Offer(after.get(), again);
+  const auto picture = source->Find(NextOf(*source).id);
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_EQ(picture->received_ns, again.received_ns);
 }
 
 TEST(PhoneSource, WaitsForAPhoneUntilItIsStopped) {
@@ -297,37 +317,71 @@ std::vector<std::string> PicturesOf(const std::filesystem::path& file) {
   return pictures;
 }
 
-TEST(PhoneSource, DecodesVp8AsWell) {
+/// Numbered pictures from 1 on, the first a key frame; empty: ffmpeg makes none.
+std::vector<std::string> Vp8Pictures(cv::Size size, int count) {
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / ("phone-" + std::to_string(getpid()) + ".ivf");
   const std::string command =
-      "ffmpeg -v error -y -f rawvideo -pix_fmt gray -s 320x240 -r 30 -i - -c:v libvpx -deadline "
-      "realtime -b:v 1M -auto-alt-ref 0 -lag-in-frames 0 " +
+      "ffmpeg -v error -y -f rawvideo -pix_fmt gray -s " + std::to_string(size.width) + "x" +
+      std::to_string(size.height) +
+      " -r 30 -i - -c:v libvpx -deadline realtime -b:v 1M -auto-alt-ref 0 -lag-in-frames 0 " +
       file.string();
   FILE* ffmpeg = popen(command.c_str(), "w");
-  ASSERT_NE(ffmpeg, nullptr);
-  for (int i = 1; i <= 20; ++i) {
-    const cv::Mat picture = NumberedPicture(i, {320, 240});
+  if (ffmpeg == nullptr) return {};
+  for (int i = 1; i <= count; ++i) {
+    const cv::Mat picture = NumberedPicture(i, size);
     fwrite(picture.data, 1, picture.total(), ffmpeg);
   }
-  ASSERT_EQ(pclose(ffmpeg), 0) << "ffmpeg (deploy/install test) makes no VP8";
+  std::vector<std::string> pictures;
+  if (pclose(ffmpeg) == 0) pictures = PicturesOf(file);
+  std::filesystem::remove(file);
+  return pictures;
+}
+
+CodedPicture Vp8Picture(int number, bool key, const std::string& data) {
+  CodedPicture picture;
+  picture.picture_id = static_cast<std::uint64_t>(number);
+  picture.codec = PacketHeader::kVp8;
+  picture.key_frame = key;
+  picture.capture_ns = MonotonicNow() + FakePhone::kAhead_ns;
+  picture.data = data;
+  picture.received_ns = MonotonicNow();
+  return picture;
+}
+
+TEST(PhoneSource, DecodesVp8AsWell) {
+  const std::vector<std::string> pictures = Vp8Pictures({320, 240}, 20);
+  ASSERT_FALSE(pictures.empty()) << "ffmpeg (deploy/install test) makes no VP8";
   const auto source = OpenPhone();
   const auto phone = std::make_shared<FakePhone>();
   source->Begin(phone);
   int number = 0;
-  for (const std::string& data : PicturesOf(file)) {
-    CodedPicture picture;
-    picture.picture_id = static_cast<std::uint64_t>(++number);
-    picture.codec = PacketHeader::kVp8;
-    picture.key_frame = number == 1;
-    picture.capture_ns = MonotonicNow() + FakePhone::kAhead_ns;
-    picture.data = data;
-    picture.received_ns = MonotonicNow();
-    source->Offer(phone.get(), std::move(picture));
+  for (const std::string& data : pictures) {
+    ++number;
+    source->Offer(phone.get(), Vp8Picture(number, number == 1, data));
     ASSERT_EQ(NumberIn(NextOf(*source).grey), number);
   }
   EXPECT_EQ(number, 20);
-  std::filesystem::remove(file);
+}
+
+TEST(PhoneSource, PicturesThatAreTooLargeEndNoDecoder) {
+  // Few pixels, but a side that no picture may have; and more pixels than are decoded at all.
+  for (const cv::Size size : {cv::Size(8208, 16), cv::Size(1280, 720)}) {
+    const std::vector<std::string> large = Vp8Pictures(size, 1);
+    ASSERT_FALSE(large.empty()) << "ffmpeg (deploy/install test) makes no VP8";
+    const auto source = OpenPhone();
+    const auto phone = std::make_shared<FakePhone>();
+    source->Begin(phone);
+    source->Offer(phone.get(), phone->Code(1, true));
+    EXPECT_EQ(NumberIn(NextOf(*source).grey), 1);
+    for (int i = 1; i <= 5; ++i) {
+      source->Offer(phone.get(), Vp8Picture(i + 1, true, large.front()));
+      ASSERT_TRUE(Soon([&] { return source->bad_frames() == static_cast<std::uint64_t>(i); }));
+    }
+    source->Offer(phone.get(), phone->Code(9, true));
+    EXPECT_EQ(NumberIn(NextOf(*source).grey), 9);
+    EXPECT_EQ(source->decoder_restarts(), 0u);
+  }
 }
 
 }  // namespace

@@ -12,6 +12,15 @@ TEST(PeerAddress, AHouseholdIsOneCallerAndAMappedAddressIsItself) {
   EXPECT_NE(PeerKey("2001:db8:0:1::5"), PeerKey("2001:db8:0:2::5"));
 }
 
+TEST(PeerAddress, IsWrittenInOneWay) {
+  EXPECT_EQ(PlainAddress("2001:DB8:0::5"), "2001:db8::5");
+  EXPECT_EQ(PlainAddress("::ffff:10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(PlainAddress("::FFFF:a00:1"), "10.0.0.1");
+  EXPECT_EQ(PlainAddress("fe80::1%eth0"), "fe80::1");
+  EXPECT_EQ(PeerKey("fe80::1%eth0"), PeerKey("fe80::2%eth0")) << "one link, one caller";
+  EXPECT_EQ(PlainAddress(""), "");
+}
+
 TEST(PeerAddress, ThisMachineIsLoopbackAndNothingElse) {
   for (const char* own : {"127.0.0.1", "127.1.2.3", "::1"})
     EXPECT_TRUE(IsThisMachine(PeerKey(own)));
