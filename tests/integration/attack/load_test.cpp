@@ -37,7 +37,8 @@ TEST_F(Load, HeldStreamsCostNoThreadEach) {
   watch.join();
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();
   tally_.Add("threads more", most - before.threads);
-  EXPECT_LE(most, before.threads + 16);
+  // gRPC adds and drops threads of its own; one for each of some 80 streams would be seen.
+  EXPECT_LE(most, before.threads + 24);
 }
 
 class Floods : public AttackTest {

@@ -90,7 +90,7 @@ TEST_F(Vanishing, ReadersOfAByteASecondHoldNobodyUp) {
   ASSERT_TRUE(target_->Alive()) << target_->Obituary();
   tally_.Add("KiB more", grown_kib);
   EXPECT_GE(tally_.of("slow readers"), 20);
-  EXPECT_LT(grown_kib, 50 * 1024);
+  EXPECT_LT(grown_kib, 64 * 1024);  // about 1 MB each, most of it gRPC's; none that grows with time
   if (quiet_hz < 15) {
     tally_.Add("not judged: machine too slow");
   } else {

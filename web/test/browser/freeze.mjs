@@ -35,6 +35,7 @@ async function freeze({ expert, truth }, still) {
 
 export async function frozenPicture(context) {
   const { expert, session, annotations, truth, check } = context;
+  const { share = 0.02 } = context; // of the depth, as for clicks in the live picture
   await expert.enlarge('video');
   const still = expert.page.locator('canvas.still[data-lossless]');
   const id = await freeze(context, still);
@@ -75,8 +76,8 @@ export async function frozenPicture(context) {
     });
     const refused = ids.find((entry) => entry.refused)?.refused;
     check(
-      `clicks in the frozen picture${gone ? ` after ${RING_S} s` : ''}, median error below 2 % of depth`,
-      errors.length > 0 && median(errors) < 0.02,
+      `clicks in the frozen picture${gone ? ` after ${RING_S} s` : ''}, median error below ${100 * share} % of depth`,
+      errors.length > 0 && median(errors) < share,
       refused ?? errors.map((e, i) => `${ids[i].object.name} ${(100 * e).toFixed(2)} %`).join(', '),
     );
     check(
