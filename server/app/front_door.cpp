@@ -142,19 +142,22 @@ void FrontDoor::Watch(OnNew on_new) {
 }
 
 void FrontDoor::Look(const OnNew& on_new) {
-  absl::StatusOr<ServerIdentity> now = Identify();
-  if (!now.ok()) {
-    if (said_ != now.status().message()) {
-      Log(absl::StrCat("tls: the present certificate stays: ", now.status().message()));
+  const absl::StatusOr<ServerIdentity> now = Identify();
+  const bool same = now.ok() && now->chain_pem == served_chain_;
+  absl::Status status = now.status();
+  if (now.ok() && !same) status = on_new(*now);
+  if (!status.ok()) {
+    if (said_ != status.message()) {
+      Log(absl::StrCat("tls: the present certificate stays: ", status.message()));
     }
-    said_ = std::string(now.status().message());
+    said_ = std::string(status.message());
     return;
   }
   said_.clear();
-  if (now->chain_pem == served_chain_) return;
-  SayNotNamed(*now);
-  on_new(*now);
+  if (same) return;
   served_chain_ = now->chain_pem;
+  SayNotNamed(*now);
+  Log("tls: who connects from now on sees the new certificate");
 }
 
 FrontDoor::~FrontDoor() {

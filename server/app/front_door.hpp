@@ -28,8 +28,9 @@ class FrontDoor {
 
   /// Looks every ten seconds whether there is another certificate: the given files were changed, or
   /// the own one expires, or this machine has a new name or address; `on_new` hears of it, on a
-  /// thread of this object's. Null: no more. Does nothing where nobody speaks TLS.
-  using OnNew = std::function<void(const ServerIdentity&)>;
+  /// thread of this object's, and again ten seconds later if it fails. Null: no more. Does nothing
+  /// where nobody speaks TLS.
+  using OnNew = std::function<absl::Status(const ServerIdentity&)>;
   void Watch(OnNew on_new);
 
   /// Nothing: `address` speaks plain.

@@ -128,15 +128,15 @@ absl::Status LetIn(FrontDoor& door, const ServerConfig& config, RpcServerOptions
   return absl::OkStatus();
 }
 
-void Renew(const ServerIdentity& renewed, const ServerConfig& config, RpcServer& rpc,
-           Gateway& gateway) {
+absl::Status Renew(const ServerIdentity& renewed, const ServerConfig& config, RpcServer& rpc,
+                   Gateway& gateway) {
   absl::Status status;
   if (config.WantsTls(config.http)) status = gateway.SetTls(renewed.chain_pem, renewed.key_pem);
-  if (status.ok() && config.WantsTls(config.grpc)) {
-    status = rpc.SetTls({renewed.chain_pem, renewed.key_pem});
+  // Also where the other port could not.
+  if (config.WantsTls(config.grpc)) {
+    status.Update(rpc.SetTls({renewed.chain_pem, renewed.key_pem}));
   }
-  Log(status.ok() ? "tls: who connects from now on sees the new certificate"
-                  : absl::StrCat("tls: the new certificate is not served: ", status.message()));
+  return status;
 }
 
 // One line, also where a library's own words have several.
@@ -196,7 +196,8 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   if (!gateway.ok()) return gateway.status();
   const absl::Status announced = (*door)->Announce((*rpc)->port(), (*gateway)->port());
   if (!announced.ok()) return announced;
-  (*door)->Watch([&](const ServerIdentity& renewed) { Renew(renewed, config, **rpc, **gateway); });
+  (*door)->Watch(
+      [&](const ServerIdentity& renewed) { return Renew(renewed, config, **rpc, **gateway); });
   const absl::Cleanup no_watch = [&door] { (*door)->Watch(nullptr); };
   (*engine)->Start();
   shutdown.SetPhase("a frame, a call or the disk to be done with");

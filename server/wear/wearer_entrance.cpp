@@ -7,6 +7,7 @@
 
 #include "saccade/v1/wearer.pb.h"
 #include "server/identity/role_table.hpp"
+#include "server/pipeline/peer_address.hpp"
 #include "shared/io/log.hpp"
 #include "shared/wire/to_proto.hpp"
 
@@ -255,16 +256,19 @@ std::unique_ptr<WearerPort::Link> WearerEntrance::Open(const std::string& peer,
 }
 
 bool WearerEntrance::Arrive(const std::string& peer) {
+  const std::string key = PeerKey(peer);
   const std::lock_guard lock(mutex_);
-  const bool crowded =
-      strangers_.size() >= kMostStrangers || strangers_.count(peer) >= kMostStrangersOfPeer;
-  if (!crowded) strangers_.insert(peer);
+  // A proxy on this machine brings everybody by one address.
+  const bool crowded = strangers_.size() >= kMostStrangers ||
+                       (!IsThisMachine(key) && strangers_.count(key) >= kMostStrangersOfPeer);
+  if (!crowded) strangers_.insert(key);
   return !crowded;
 }
 
 void WearerEntrance::Depart(const std::string& peer) {
   const std::lock_guard lock(mutex_);
-  if (const auto found = strangers_.find(peer); found != strangers_.end()) strangers_.erase(found);
+  if (const auto found = strangers_.find(PeerKey(peer)); found != strangers_.end())
+    strangers_.erase(found);
 }
 
 bool WearerEntrance::TakeOver(const std::shared_ptr<PhoneLinkImpl>& link) {

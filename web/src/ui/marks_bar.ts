@@ -1,5 +1,4 @@
 import { type Control, MARK_COMMANDS, type MarkCommandName } from '../tools/tools';
-import { NO_FILTER } from '../tools/mark_filter';
 import type { AppState } from './app_state';
 import { h, icon, setClass, setText } from './dom';
 import { ICONS } from './icons';
@@ -36,6 +35,7 @@ export class MarksBar {
   }
 
   private filter(text: string): void {
+    this.field.value = text;
     this.state.filter = { ...this.state.filter, text };
     this.state.changed();
   }
@@ -48,9 +48,6 @@ export class MarksBar {
 
   update(): void {
     const { filter, hideMarks } = this.state;
-    if (filter === NO_FILTER || filter.text === '') {
-      if (document.activeElement !== this.field) this.field.value = filter.text;
-    }
     for (const [name, on] of [
       ['mine', filter.mine],
       ['hide', hideMarks],

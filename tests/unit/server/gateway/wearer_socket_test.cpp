@@ -241,6 +241,39 @@ TEST_F(WearerSocketTest, AFloodOfMessagesEndsTheLink) {
   EXPECT_THAT(RefusedWith(client), HasSubstr("too many messages"));
 }
 
+TEST_F(WearerSocketTest, MoreBytesThanAnyPhoneSendsEndTheLink) {
+  WearerClient<> client(port());
+  ASSERT_TRUE(client.Upgrade(origin()));
+  ASSERT_TRUE(client.Hello(PassOf(AccessRole::kWearer)));
+  ASSERT_TRUE(client.Await(Down::kWelcome).has_value());
+  v1::WearerUpstream message;
+  message.mutable_picture()->set_codec(v1::WEARER_CODEC_H264);
+  message.mutable_picture()->set_data(std::string(1 << 20, 'x'));
+  for (int i = 0; i < 20 && client.Send(message); ++i) {
+  }
+  EXPECT_THAT(RefusedWith(client), HasSubstr("6 MB a second"));
+}
+
+TEST_F(WearerSocketTest, LinksWithoutAHelloAreFewAndShort) {
+  const std::string token = PassOf(AccessRole::kWearer);
+  std::vector<std::unique_ptr<WearerClient<>>> silent;
+  for (int i = 0; i < 128; ++i) {
+    silent.push_back(std::make_unique<WearerClient<>>(port()));
+    ASSERT_TRUE(silent.back()->Upgrade(origin())) << i;
+  }
+  WearerClient<> one_more(port());
+  ASSERT_TRUE(one_more.Upgrade(origin()));
+  one_more.Hello(token);
+  EXPECT_THAT(RefusedWith(one_more), HasSubstr("too many links"));
+  EXPECT_THAT(RefusedWith(*silent.front()), HasSubstr("no hello came"));
+  silent.clear();
+  std::this_thread::sleep_for(milliseconds(300));
+  WearerClient<> after(port());
+  ASSERT_TRUE(after.Upgrade(origin()));
+  ASSERT_TRUE(after.Hello(token));
+  EXPECT_TRUE(after.Await(Down::kWelcome).has_value());
+}
+
 TEST_F(WearerSocketTest, OnePhoneAtATimeAndTheSameOneTakesOver) {
   const std::string token = PassOf(AccessRole::kWearer), other = PassOf(AccessRole::kWearer);
   WearerClient<> first(port());

@@ -231,6 +231,18 @@ TEST(WaitingRoom, AsASettingHoldsEverybodyBelowTheWearer) {
   EXPECT_FALSE(Redeem(*book, Invite(*book, AccessRole::kWearer).token)->waiting);
 }
 
+TEST(WaitingRoom, HoldsAlsoWhoComesByAnInviteThatIsOlder) {
+  const TemporaryFolder folder;
+  const std::string older = [&] {
+    const auto book = *AccessBook::Open(folder.path(), Options());
+    return Invite(*book, AccessRole::kPilot).token;
+  }();
+  AccessBook::Options options = Options();
+  options.waiting_room = true;
+  const auto book = *AccessBook::Open(folder.path(), options);
+  EXPECT_TRUE(Redeem(*book, older)->waiting);
+}
+
 // Written by the version before the waiting room.
 TEST(AccessBook, AnOlderFileGoesOn) {
   const TemporaryFolder folder;
