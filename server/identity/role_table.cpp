@@ -23,13 +23,22 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"SessionService/Ping", kViewer},
     {"SessionService/GetFrame", kViewer},
     {"SessionService/GetStatus", kViewer},
+    {"SessionService/PausePicture", kWearer},
 
     {"AnnotationService/List", kViewer},
+    {"AnnotationService/GetPicture", kViewer},
     {"AnnotationService/Create", kAnnotator},
     {"AnnotationService/Update", kAnnotator},
     {"AnnotationService/Delete", kAnnotator},
     {"AnnotationService/Undo", kAnnotator},
     {"AnnotationService/Redo", kAnnotator},
+    {"AnnotationService/TickCheckItem", kAnnotator},
+
+    {"PointerService/Point", kAnnotator},
+
+    {"TalkService/ListMessages", kViewer},
+    {"TalkService/Say", kAnnotator},
+    {"TalkService/Speak", kAnnotator},
 
     {"MapService/Get", kViewer},
     {"MapService/Export", kViewer},
