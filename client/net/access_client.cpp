@@ -92,6 +92,12 @@ absl::StatusOr<Pass> AccessClient::Redeem(const std::string& invite,
               response->waiting()};
 }
 
+absl::StatusOr<bool> AccessClient::Waits() {
+  const auto response = impl_->Call(&v1::AccessService::Stub::GetAccess, v1::GetAccessRequest());
+  if (!response.ok()) return response.status();
+  return response->waiting();
+}
+
 absl::StatusOr<NewInvite> AccessClient::Create(const std::string& role, std::uint32_t life_s,
                                                std::uint32_t uses, const std::string& label,
                                                bool waiting_room) {

@@ -51,6 +51,8 @@ class AccessClient {
 
   /// `invite`: a link, or what stands behind its #invite=.
   absl::StatusOr<Pass> Redeem(const std::string& invite, const std::string& display_name = "");
+  /// True while the holder of the token waits to be let in.
+  absl::StatusOr<bool> Waits();
   // With the owner's token. `life_s` and `uses` 0: as the server has them.
   absl::StatusOr<NewInvite> Create(const std::string& role, std::uint32_t life_s,
                                    std::uint32_t uses, const std::string& label,

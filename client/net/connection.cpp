@@ -111,11 +111,13 @@ class Connection::Impl {
     v1::JoinRequest request;
     request.set_display_name(options_.display_name);
     request.set_role(ToProto(options_.role));
+    request.set_person_key(options_.person_key);
     request.set_resume_session_id(options_.session_id);  // whose undo goes on, if it is known yet
     absl::StatusOr<v1::JoinResponse> response =
         Call(*session_, &v1::SessionService::Stub::Join, request);
     if (!response.ok()) return response.status();
     session_id_ = response->session_id();
+    joined_ = {response->participant_id(), response->source(), response->server_version()};
     return absl::OkStatus();
   }
 
@@ -170,6 +172,7 @@ class Connection::Impl {
 
   const ConnectionOptions options_;
   std::string session_id_;
+  Joined joined_;
   const std::shared_ptr<grpc::Channel> channel_;
   const std::unique_ptr<v1::SessionService::Stub> session_;
   const std::unique_ptr<v1::MapService::Stub> map_;
@@ -190,7 +193,14 @@ absl::StatusOr<std::string> Connection::Session() {
   return impl_->session_id_;
 }
 
+absl::StatusOr<std::string> Connection::JoinAnew() {
+  impl_->session_id_.clear();
+  return Session();
+}
+
 const std::string& Connection::session_id() const { return impl_->session_id_; }
+
+const Joined& Connection::joined() const { return impl_->joined_; }
 
 absl::StatusOr<ServerStatus> Connection::GetStatus() {
   auto response =
@@ -337,6 +347,20 @@ absl::StatusOr<GazeSnapshot> Connection::StopFixating() {
 absl::StatusOr<GazeSnapshot> Connection::Home() {
   auto response =
       impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::Home, v1::HomeRequest());
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->state(), "state");
+}
+
+absl::StatusOr<GazeSnapshot> Connection::KeepHorizon() {
+  auto response = impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::KeepHorizon,
+                                       v1::KeepHorizonRequest());
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->state(), "state");
+}
+
+absl::StatusOr<GazeSnapshot> Connection::Explore() {
+  auto response =
+      impl_->CallInSession(*impl_->gaze_, &v1::GazeService::Stub::Explore, v1::ExploreRequest());
   if (!response.ok()) return response.status();
   return wire::FromProto(response->state(), "state");
 }

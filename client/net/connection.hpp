@@ -32,10 +32,20 @@ struct ConnectionOptions {
   std::string root_pem{};
   /// The name that the certificate must have; empty: `server`'s host.
   std::string tls_name{};
+  /// A secret that stands for the person, kept between sessions: 32 to 64 of [A-Za-z0-9_-]; empty:
+  /// a new person each time.
+  std::string person_key{};
   /// What the server lets in by (AccessClient::Redeem); secret. Empty: none.
   std::string token{};
 
   absl::Status Validate() const;
+};
+
+/// What the server said of a session when it was joined.
+struct Joined {
+  std::string participant_id;  // what others know this session by
+  std::string source;          // for example "sim:desk?motion=sway"
+  std::string server_version;
 };
 
 /// One server as a client sees it: every call in domain types, checked on arrival.
@@ -58,8 +68,12 @@ class Connection {
 
   /// The session that calls are made in; joins, or joins anew if the server no longer knows it.
   absl::StatusOr<std::string> Session();
+  /// Joins whatever was joined before, going on with options.session_id if the server knows it.
+  absl::StatusOr<std::string> JoinAnew();
   /// The same without asking the server; empty if no call needed one yet.
   const std::string& session_id() const;
+  /// Of that session; empty if it was joined earlier (options.session_id) or not yet.
+  const Joined& joined() const;
 
   absl::StatusOr<ServerStatus> GetStatus();
   /// The newest frame if `frame_id` is nothing.
@@ -89,6 +103,8 @@ class Connection {
   GazeAnswer Fixate(const GazeTarget& target, bool fast);
   GazeAnswer StopFixating();
   GazeAnswer Home();
+  GazeAnswer KeepHorizon();
+  GazeAnswer Explore();
   GazeAnswer CalibrateMount();
   absl::StatusOr<MountCalibrationReport> GetMountCalibration();
 

@@ -60,7 +60,8 @@ function(saccade_precompile name kind)
   endif()
 endfunction()
 
-file(WRITE ${CMAKE_BINARY_DIR}/pch.cpp "namespace {}\n")
+# Written only if it differs: otherwise each run of CMake would compile nearly everything anew.
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/pch.cpp CONTENT "namespace {}\n")
 foreach(kind eigen vision rpc)
   add_library(saccade_pch_${kind} STATIC ${CMAKE_BINARY_DIR}/pch.cpp)
   target_link_libraries(saccade_pch_${kind} PRIVATE saccade_build_options Eigen3::Eigen)

@@ -14,6 +14,9 @@ find_package(SQLite3 REQUIRED)
 find_package(OpenSSL 3 REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(OpenH264 REQUIRED IMPORTED_TARGET openh264)
+# saccade-client alone. libimgui.a holds its backends for GLFW and OpenGL 3, which loads OpenGL itself.
+find_package(glfw3 3.3 REQUIRED)
+pkg_check_modules(Imgui REQUIRED IMPORTED_TARGET imgui)
 pkg_check_modules(OSMesa REQUIRED IMPORTED_TARGET osmesa)
 pkg_check_modules(Seccomp REQUIRED IMPORTED_TARGET libseccomp)
 # Of saccade-decode alone (architecture, section 7).

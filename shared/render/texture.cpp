@@ -28,7 +28,7 @@ GlLayout LayoutOf(PixelLayout layout) {
 
 Texture::Texture(const GlFunctions& gl, int width, int height, PixelLayout layout,
                  std::span<const std::uint8_t> pixels, const Options& options)
-    : gl_(gl) {
+    : gl_(gl), width_(width), height_(height), layout_(layout) {
   const GlLayout gl_layout = LayoutOf(layout);
   gl_.GenTextures(1, &id_);
   gl_.BindTexture(GL_TEXTURE_2D, id_);
@@ -48,6 +48,13 @@ Texture::Texture(const GlFunctions& gl, int width, int height, PixelLayout layou
 }
 
 Texture::~Texture() { gl_.DeleteTextures(1, &id_); }
+
+void Texture::Replace(std::span<const std::uint8_t> pixels) {
+  gl_.BindTexture(GL_TEXTURE_2D, id_);
+  gl_.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  gl_.TexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, LayoutOf(layout_).format,
+                    GL_UNSIGNED_BYTE, pixels.data());
+}
 
 void Texture::Bind(int unit) const {
   gl_.ActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));

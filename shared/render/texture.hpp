@@ -26,11 +26,15 @@ class Texture {
   Texture(const Texture&) = delete;
   Texture& operator=(const Texture&) = delete;
 
+  /// Other pixels of the same size and layout. For a texture without mip-maps.
+  void Replace(std::span<const std::uint8_t> pixels);
   void Bind(int unit) const;
   GLuint id() const { return id_; }
 
  private:
   const GlFunctions& gl_;
+  const int width_, height_;
+  const PixelLayout layout_;
   GLuint id_ = 0;
 };
 

@@ -18,7 +18,8 @@ constexpr auto kServerOrder = std::to_array<string_view>(
     {"pipeline", "mount",    "gl",      "capture", "sim",      "features", "filter",
      "map",      "tracker",  "anchors", "gaze",    "wearable", "overlay",  "encode",
      "store",    "identity", "rpc",     "wear",    "gateway",  "eval",     "app"});
-constexpr auto kClientOrder = std::to_array<string_view>({"net", "cli"});
+constexpr auto kClientOrder =
+    std::to_array<string_view>({"net", "session", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder = std::to_array<string_view>(
     {"version", "io", "geometry", "time", "camera", "scene", "marks", "wire", "render"});
 
@@ -49,10 +50,12 @@ const std::vector<Home>& Homes() {
       {"sqlite3.h", {"server/store"}},
       {"openssl/", {"server/identity", "client/net"}},
       {"qrencode.h", {"shared/io"}},
-      {"wels/", {"server/encode"}},
+      {"wels/", {"server/encode", "client/decode"}},
       {"GL/osmesa.h", {"server/gl"}},
       {"EGL/", {"server/gl"}},
-      {"GLFW/", {}},
+      {"GLFW/", {"client/view"}},
+      {"imgui", {"client/view", "client/app"}},
+      {"backends/imgui", {"client/view"}},
       {"hb.h", {"server/overlay"}},
       {"ft2build.h", {"server/overlay"}},
       {"fribidi.h", {"server/overlay"}},

@@ -39,9 +39,11 @@ std::unique_ptr<TemporaryFolder> Installed::folder_;
 
 TEST_F(Installed, HoldsProgramsServiceConfigurationLicenceAndExamples) {
   for (const char* file : {"/usr/bin/saccade", "/usr/bin/saccade-server", "/usr/bin/saccade-eval",
-                           "/usr/bin/saccade-decode", "/usr/lib/systemd/system/saccade.service",
-                           "/etc/saccade/saccade.toml", "/usr/share/doc/saccade/copyright",
-                           "/usr/share/doc/saccade/install.md",
+                           "/usr/bin/saccade-decode", "/usr/bin/saccade-client",
+                           "/usr/share/applications/saccade-client.desktop",
+                           "/usr/share/icons/hicolor/scalable/apps/saccade.svg",
+                           "/usr/lib/systemd/system/saccade.service", "/etc/saccade/saccade.toml",
+                           "/usr/share/doc/saccade/copyright", "/usr/share/doc/saccade/install.md",
                            "/usr/share/doc/saccade/examples/python/place_mark.py"}) {
     EXPECT_TRUE(fs::is_regular_file(At(file))) << file;
   }
@@ -59,8 +61,10 @@ TEST_F(Installed, HoldsNothingElseBesides) {
     EXPECT_TRUE(std::regex_search(
         path,
         std::regex(
-            "^(/usr/bin/saccade(-server|-eval|-decode)?|/usr/lib/systemd/system/saccade.service|"
+            "^(/usr/bin/saccade(-server|-eval|-decode|-client)?|/usr/lib/systemd/system/saccade.service|"
             "/etc/saccade/saccade.toml|/usr/share/(saccade/web|doc/saccade)/.*|"
+            "/usr/share/applications/saccade-client.desktop|"
+            "/usr/share/icons/hicolor/scalable/apps/saccade.svg|"
             "/usr/share/man/man[18]/saccade.*)$")))
         << path;
   }

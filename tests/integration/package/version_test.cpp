@@ -17,7 +17,7 @@ using ::testing::MatchesRegex;
 TEST(Version, EveryProgramSaysTheSameVersionAndCommit) {
   std::set<std::string> said;
   for (const std::string program :
-       {"saccade", "saccade-server", "saccade-eval", "saccade-decode"}) {
+       {"saccade", "saccade-server", "saccade-eval", "saccade-decode", "saccade-client"}) {
     const RunResult run = RunProgram({SACCADE_BIN "/" + program, "--version"});
     EXPECT_EQ(run.exit_code, 0) << program << run.err;
     ASSERT_EQ(run.out.rfind(program + " ", 0), 0U) << run.out;

@@ -1,0 +1,182 @@
+#include "client/app/app.hpp"
+
+#include <absl/strings/str_cat.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/app/entrance.hpp"
+#include "client/app/snapshot.hpp"
+#include "client/cli/interrupt.hpp"
+#include "client/view/panels.hpp"
+
+namespace saccade::app {
+namespace {
+
+constexpr Timestamp kFrameNs = 16'000'000;
+constexpr Timestamp kIdleNs = 1'000'000'000;  // ages in words grow by themselves
+constexpr double kLongestWaitS = 0.5;         // a signal is noticed within this
+constexpr int kSettle = 3;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<App>> App::Create(const Options& options, Settings settings) {
+  std::unique_ptr<App> app(new App(std::move(settings)));
+  if (!options.trace.empty()) {
+    auto trace = Trace::Create(options.trace);
+    if (!trace.ok()) return trace.status();
+    app->trace_ = *std::move(trace);
+  }
+  auto window = view::Window::Open("Saccade", app->settings_.window);
+  if (!window.ok()) return window.status();
+  app->window_ = *std::move(window);
+  for (const Address& address : options.servers) {
+    if (absl::Status added = app->AddTab(options, address); !added.ok()) return added;
+  }
+  return app;
+}
+
+absl::Status App::AddTab(const Options& options, const Address& address) {
+  session::SessionOptions session;
+  session.connection.server = address.server;
+  session.connection.display_name = settings_.name;
+  session.connection.person_key = PersonKey();
+  session.enter = MakeEntrance(options, address);
+  Tab tab;
+  tab.desk = std::make_unique<view::Desk>(std::move(session), address.server, &view::Window::Wake);
+  tab.desk->state().main = settings_.main;
+  tab.desk->state().my_name = settings_.name;
+  tab.desk->keep_snapshot = [](const net::Still& still, const view::Desk& desk) {
+    const auto file =
+        KeepSnapshot(still, desk.session().annotations.List(), desk.session().joined.source,
+                     desk.state().my_name, PicturesFolder());
+    return file.ok() ? absl::StrCat("Kept as ", file->string())
+                     : absl::StrCat("No snapshot: ", file.status().message());
+  };
+  auto view = view::DeskView::Create(window_->gl(), *tab.desk);
+  if (!view.ok()) return view.status();
+  tab.view = *std::move(view);
+  tabs_.push_back(std::move(tab));
+  return absl::OkStatus();
+}
+
+Settings App::settings() const {
+  Settings now = settings_;
+  now.window = window_->place();
+  now.main = tabs_.front().desk->state().main;
+  return now;
+}
+
+absl::Status App::Run() {
+  Timestamp drawn_ns = 0, stepped_ns = MonotonicNow();
+  bool due = true;
+  while (!window_->closing() && !cli::Interrupted()) {
+    const Timestamp next_ns = drawn_ns + (due ? kFrameNs : kIdleNs);
+    window_->Wait(std::clamp(Seconds(next_ns - MonotonicNow()), 0.0, kLongestWaitS));
+    Timestamp now_ns = MonotonicNow();
+    // Before a new picture is taken: what was done was done to what is on the screen.
+    HandleInput(now_ns);
+    if (window_->TakeRefresh()) busy_frames_ = kSettle;
+    due = due || busy_frames_ > 0;
+    for (std::size_t i = 0; i < tabs_.size(); ++i) due = tabs_[i].desk->Poll(now_ns) || due;
+    now_ns = MonotonicNow();
+    if (now_ns - drawn_ns < (due ? kFrameNs : kIdleNs)) continue;
+    const bool moving = tab().desk->StepMap(1e-6 * static_cast<double>(now_ns - stepped_ns));
+    stepped_ns = now_ns;
+    if (absl::Status drawn = Draw(now_ns); !drawn.ok()) return drawn;
+    drawn_ns = now_ns;
+    busy_frames_ = std::max(busy_frames_ - 1, 0);
+    due = moving || busy_frames_ > 0;
+  }
+  return absl::OkStatus();
+}
+
+void App::HandleInput(Timestamp now_ns) {
+  for (const view::InputEvent& event : window_->TakeInput()) {
+    busy_frames_ = kSettle;
+    if (event.kind == view::InputEvent::Kind::kKey) {
+      HandleKey(event, now_ns);
+      continue;
+    }
+    const std::vector<view::Rect>& above = tab().desk->state().above;
+    const bool covered = std::any_of(above.begin(), above.end(), [&event](const view::Rect& rect) {
+      return rect.Contains(event.x, event.y);
+    });
+    pointer_.Handle(event, layout_, *tab().desk, *tab().view, !help_ && !covered, settings_.layout,
+                    now_ns);
+  }
+}
+
+void App::HandleKey(const view::InputEvent& event, Timestamp now_ns) {
+  view::Desk& desk = *tab().desk;
+  const ImGuiIO& io = ImGui::GetIO();
+  const std::optional<tools::Action> action = tools::ActionOf(event.key);
+  if (action == tools::Action::kEscape && help_) {
+    help_ = false;
+    return;
+  }
+  // Letters are tools only where nobody writes.
+  if ((io.WantTextInput || desk.state().editor || help_) && action != tools::Action::kEscape) {
+    if (help_ && action == tools::Action::kHelp) help_ = false;
+    return;
+  }
+  if (!action) {
+    if (!io.NavVisible) pointer_.HandleKey(event, layout_, desk, *tab().view, now_ns);
+    return;
+  }
+  if (event.repeat && tools::ControlOf(*action).group == tools::Group::kHead) return;
+  if (action == tools::Action::kHelp) {
+    help_ = true;
+  } else if (action == tools::Action::kNextTab) {
+    shown_ = (shown_ + 1) % tabs_.size();
+  } else {
+    desk.Run(*action, now_ns);
+  }
+}
+
+absl::Status App::Draw(Timestamp now_ns) {
+  if (absl::Status begun = window_->Begin(); !begun.ok()) return begun;
+  if (trace_) trace_->Drawing();
+  tab().view->Update();
+  layout_ = view::LayOut(window_->width(), window_->height(), window_->scale(), tabs_.size() > 1,
+                         tab().view->aspect(), settings_.layout);
+  tab().desk->state().above.clear();
+  DrawPanes({layout_.scale, window_->pixel_ratio(), window_->height()}, now_ns);
+  DrawPanels(now_ns);
+  if (pointer_.over_edge()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
+  const std::size_t drawn = shown_;
+  window_->End();
+  const Timestamp shown_ns = MonotonicNow();
+  tabs_[drawn].desk->Shown(shown_ns);
+  if (trace_) trace_->Shown(*tabs_[drawn].desk, *tabs_[drawn].view, layout_, drawn, shown_ns);
+  return absl::OkStatus();
+}
+
+void App::DrawPanes(const view::Canvas& canvas, Timestamp now_ns) {
+  using view::Pane;
+  ImDrawList* list = ImGui::GetBackgroundDrawList();
+  const Pane main = tab().desk->state().main;
+  const Pane other = main == Pane::kMap ? Pane::kVideo : Pane::kMap;
+  tab().view->Draw(main, layout_.main, canvas, list, now_ns);
+  tab().view->Draw(other, layout_.inset, canvas, list, now_ns);
+  const view::Rect& inset = layout_.inset;
+  list->AddRect({inset.x - 1, inset.y - 1}, {inset.right() + 1, inset.bottom() + 1}, view::kLine, 0,
+                0, 2 * layout_.scale);
+}
+
+void App::DrawPanels(Timestamp now_ns) {
+  const view::PanelContext context{*tab().desk, window_->fonts(), now_ns, layout_.scale};
+  if (view::DrawHeader(context, layout_.header)) help_ = !help_;
+  std::vector<view::Desk*> desks;
+  for (const Tab& each : tabs_) desks.push_back(each.desk.get());
+  view::DrawTools(context, layout_.tools);
+  view::DrawAnnotations(context, layout_.panel);
+  view::DrawGaze(context, layout_.gaze);
+  view::DrawStrip(context, layout_.strip);
+  view::DrawEditor(context, layout_.main);
+  view::DrawHelp(context, help_);
+  if (tabs_.size() > 1) shown_ = view::DrawTabs(desks, shown_, layout_.tabs, now_ns);
+}
+
+}  // namespace saccade::app

@@ -1,0 +1,117 @@
+#include "client/app/trace.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "client/tools/words.hpp"
+
+namespace saccade::app {
+namespace {
+
+using nlohmann::json;
+
+json RectOf(const view::Rect& rect) { return {rect.x, rect.y, rect.width, rect.height}; }
+
+json PictureOf(const view::Desk& desk, const view::DeskView& view, const view::Rect& pane) {
+  const decode::Picture* picture = desk.shown();
+  if (picture == nullptr) return nullptr;
+  const view::Placement at = view.VideoIn(pane);
+  json out = {{"frame", picture->facts->frame_id},
+              {"captured_ns", picture->facts->stages.captured_ns},
+              {"arrived_ns", picture->facts->arrived_ns},
+              {"decoded_ns", picture->decoded_ns},
+              {"left", at.left},
+              {"top", at.top},
+              {"scale", at.scale},
+              {"width", picture->rgba.cols},
+              {"height", picture->rgba.rows}};
+  const CameraIntrinsics& lens = picture->facts->camera->intrinsics();
+  out["camera"] = {{"widthPx", lens.width},
+                   {"heightPx", lens.height},
+                   {"fxPx", lens.fx},
+                   {"fyPx", lens.fy},
+                   {"cxPx", lens.cx},
+                   {"cyPx", lens.cy},
+                   {"distortion", lens.distortion}};
+  if (const auto& still = desk.state().still) {
+    out["frozen"] = true;
+    out["lossless"] = still->lossless;
+  }
+  return out;
+}
+
+json MapOf(const view::Desk& desk, const view::Rect& pane) {
+  const tools::View eye = desk.map_view(pane);
+  const Eigen::Vector3d& p = eye.world_from_camera.translation;
+  const Eigen::Quaterniond& q = eye.world_from_camera.rotation;
+  return {{"pane", RectOf(pane)},
+          {"eye", {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}},
+          {"focal", eye.camera->intrinsics().fx}};
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Trace>> Trace::Create(const std::string& name) {
+  std::FILE* file = std::fopen(name.c_str(), "w");
+  if (file == nullptr) {
+    return absl::UnavailableError(
+        absl::StrCat("--trace: cannot write ", name, ": ", std::strerror(errno)));
+  }
+  return std::unique_ptr<Trace>(new Trace(file));
+}
+
+Trace::~Trace() { std::fclose(file_); }
+
+void Trace::Write(const std::string& line) {
+  std::fputs((line + "\n").c_str(), file_);
+  std::fflush(file_);
+}
+
+void Trace::Drawing() { Write(absl::StrCat(R"({"event":"drawing","seq":)", ++sequence_, "}")); }
+
+void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view::Layout& layout,
+                  std::size_t tab, Timestamp shown_ns) {
+  const session::State& told = desk.session();
+  const view::DeskState& state = desk.state();
+  const bool map_main = state.main == view::Pane::kMap;
+  const tools::StatusWords status = tools::StatusOf(told, shown_ns);
+  json line = {{"event", "shown"},
+               {"seq", sequence_},
+               {"shown_ns", shown_ns},
+               {"tab", tab},
+               {"main", map_main ? "map" : "video"},
+               {"inset", RectOf(layout.inset)},
+               {"video", PictureOf(desk, view, map_main ? layout.inset : layout.main)},
+               {"map", MapOf(desk, map_main ? layout.main : layout.inset)},
+               {"status", status.text},
+               {"live", told.link.live()},
+               {"offset_ns", told.clock.offset_ns().value_or(0)},
+               {"tool", tools::ControlOf(state.tool).label},
+               {"selected", state.selected_id},
+               {"editing", state.editor.has_value()},
+               {"refused",
+                {{"map", state.Refusal("map")},
+                 {"video", state.Refusal("video")},
+                 {"head", state.Refusal("head")}}},
+               {"gaze", told.gaze ? ToString(told.gaze->mode) : ""},
+               {"arrived", told.gaze && told.gaze->arrived},
+               {"lease", static_cast<int>(desk.pilot().kind())}};
+  if (told.statistics) line["tracked_hz"] = told.statistics->tracked_fps_hz;
+  if (const auto& pressed = desk.pressed()) {
+    line["pressed"] = {pressed->frame_id, pressed->pixel.x(), pressed->pixel.y()};
+  }
+  json marks = json::array();
+  const tools::Scale scale = tools::ScaleOf(told);
+  for (const Annotation& annotation : told.annotations.List()) {
+    marks.push_back({{"id", annotation.id},
+                     {"text", annotation.text},
+                     {"words", tools::WordsOf(annotation, scale).text}});
+  }
+  line["marks"] = std::move(marks);
+  Write(line.dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+}  // namespace saccade::app

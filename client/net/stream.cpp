@@ -1,0 +1,169 @@
+#include "client/net/stream.hpp"
+
+#include <absl/strings/str_cat.h>
+#include <grpcpp/grpcpp.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <utility>
+
+#include "client/net/channel.hpp"
+#include "client/net/convert.hpp"
+#include "client/net/picture_reader.hpp"
+#include "saccade/v1/session.grpc.pb.h"
+#include "shared/wire/from_proto.hpp"
+#include "shared/wire/gaze.hpp"
+
+namespace saccade::net {
+namespace {
+
+constexpr std::chrono::milliseconds kDeadline(3000);
+
+absl::StatusOr<MapChange> FromProto(const v1::MapDelta& message) {
+  MapChange change{.generation = message.map_generation(),
+                   .revision = message.map_revision(),
+                   .full = message.full(),
+                   .upserted = {},
+                   .removed_ids = {message.removed_ids().begin(), message.removed_ids().end()}};
+  for (int i = 0; i < message.upserted_size(); ++i) {
+    absl::StatusOr<FeatureSnapshot> feature =
+        wire::FromProto(message.upserted(i), absl::StrCat("map.upserted[", i, "]"));
+    if (!feature.ok()) return feature.status();
+    change.upserted.push_back(*std::move(feature));
+  }
+  return change;
+}
+
+}  // namespace
+
+class Stream::Impl {
+ public:
+  Impl(const ConnectionOptions& options, std::string session_id)
+      : options_(options),
+        session_id_(std::move(session_id)),
+        stub_(v1::SessionService::NewStub(MakeChannel(options))) {
+    Authorise(options_, context_);
+  }
+
+  absl::Status Read(
+      const std::function<void(std::uint64_t, std::optional<StreamEvent>)>& on_event) {
+    v1::SubscribeRequest request;
+    request.set_session_id(session_id_);
+    request.set_window(kWindow);
+    request.set_video_view(v1::VIDEO_VIEW_RAW);
+    for (const v1::Topic topic :
+         {v1::TOPIC_POSE, v1::TOPIC_MAP, v1::TOPIC_VIDEO, v1::TOPIC_ANNOTATION, v1::TOPIC_GAZE,
+          v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS}) {
+      request.add_topics(topic);
+    }
+    const auto reader = stub_->Subscribe(&context_, request);
+    v1::Event message;
+    absl::Status failure;
+    while (failure.ok() && reader->Read(&message)) {
+      absl::StatusOr<std::optional<StreamEvent>> event = Convert(message);
+      if (!event.ok()) {
+        failure = event.status();
+        context_.TryCancel();
+      } else {
+        on_event(message.sequence(), *std::move(event));
+      }
+    }
+    const grpc::Status status = reader->Finish();
+    if (!failure.ok()) return failure;
+    return status.ok() ? absl::OkStatus() : Explain(options_, status);
+  }
+
+  void Cancel() { context_.TryCancel(); }
+
+  template <typename Request, typename Response>
+  absl::Status Call(grpc::Status (v1::SessionService::Stub::*method)(grpc::ClientContext*,
+                                                                     const Request&, Response*),
+                    const Request& request, Response& response) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kDeadline);
+    Authorise(options_, context);
+    const grpc::Status status = ((*stub_).*method)(&context, request, &response);
+    return status.ok() ? absl::OkStatus() : Explain(options_, status);
+  }
+
+  const std::string& session_id() const { return session_id_; }
+
+ private:
+  absl::StatusOr<std::optional<StreamEvent>> Convert(const v1::Event& message) {
+    switch (message.event_case()) {
+      case v1::Event::kPose:
+        return Wrap(wire::FromProto(message.pose(), "pose"));
+      case v1::Event::kMap:
+        return Wrap(FromProto(message.map()));
+      case v1::Event::kAccessUnit:
+        return Wrap(pictures_.Read(message.access_unit(), MonotonicNow()));
+      case v1::Event::kAnnotation: {
+        absl::StatusOr<AnnotationChange> part = net::FromProto(message.annotation());
+        if (!part.ok()) return part.status();
+        std::optional<AnnotationChange> whole =
+            parts_.Add(*std::move(part), message.annotation().more());
+        if (!whole) return std::optional<StreamEvent>();
+        return std::optional<StreamEvent>(*std::move(whole));
+      }
+      case v1::Event::kGaze:
+        return Wrap(wire::FromProto(message.gaze(), "gaze"));
+      case v1::Event::kStatistics:
+        return std::optional<StreamEvent>(net::FromProto(message.statistics()));
+      case v1::Event::kPresence:
+        return std::optional<StreamEvent>(net::FromProto(message.presence()));
+      case v1::Event::kEndOfSource:
+        return std::optional<StreamEvent>(SourceEnd{message.end_of_source().frames()});
+      default:
+        return std::optional<StreamEvent>();
+    }
+  }
+
+  template <typename T>
+  static absl::StatusOr<std::optional<StreamEvent>> Wrap(absl::StatusOr<T> value) {
+    if (!value.ok()) return value.status();
+    return std::optional<StreamEvent>(*std::move(value));
+  }
+
+  const ConnectionOptions options_;
+  const std::string session_id_;
+  const std::unique_ptr<v1::SessionService::Stub> stub_;
+  grpc::ClientContext context_;
+  PictureReader pictures_;
+  AnnotationParts parts_;
+};
+
+Stream::Stream(const ConnectionOptions& options, std::string session_id)
+    : impl_(std::make_unique<Impl>(options, std::move(session_id))) {}
+Stream::~Stream() = default;
+
+absl::Status Stream::Read(
+    const std::function<void(std::uint64_t, std::optional<StreamEvent>)>& on_event) {
+  return impl_->Read(on_event);
+}
+
+void Stream::Cancel() { impl_->Cancel(); }
+
+absl::Status Stream::Acknowledge(std::uint64_t sequence, bool request_key_frame) {
+  v1::AcknowledgeRequest request;
+  request.set_session_id(impl_->session_id());
+  request.set_sequence(sequence);
+  request.set_request_key_frame(request_key_frame);
+  v1::AcknowledgeResponse response;
+  return impl_->Call(&v1::SessionService::Stub::Acknowledge, request, response);
+}
+
+absl::StatusOr<PingTimes> Stream::Ping() {
+  v1::PingRequest request;
+  PingTimes times{.sent_ns = MonotonicNow()};
+  request.set_client_send_ns(times.sent_ns);
+  v1::PingResponse response;
+  const absl::Status status = impl_->Call(&v1::SessionService::Stub::Ping, request, response);
+  times.answered_ns = MonotonicNow();
+  if (!status.ok()) return status;
+  times.received_ns = response.server_receive_ns();
+  times.replied_ns = response.server_send_ns();
+  return times;
+}
+
+}  // namespace saccade::net

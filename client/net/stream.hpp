@@ -1,0 +1,97 @@
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <variant>
+#include <vector>
+
+#include "client/net/connection.hpp"
+#include "client/net/types.hpp"
+
+namespace saccade::net {
+
+/// When each stage of one frame ended, on the server's monotonic clock [ns]; 0: stage not run.
+struct StageStamps {
+  Timestamp captured_ns = 0;  // exposure middle
+  Timestamp received_ns = 0;
+  Timestamp tracked_ns = 0;
+  Timestamp encoded_ns = 0;
+};
+
+/// A feature as one frame saw it: measured, or searched for in vain where it was expected.
+struct SeenFeature {
+  FeatureState state = FeatureState::kMeasured;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw picture [px]
+};
+/// Of one frame; what is not in it was not searched for.
+using SeenFeatures = std::unordered_map<FeatureId, SeenFeature>;
+
+/// Everything that is known of a frame but its picture. An overlay is drawn from these alone.
+struct FrameFacts {
+  FrameId frame_id = 0;
+  std::shared_ptr<const CameraModel> camera;  // of the picture as coded
+  std::optional<MapSnapshot> pose;            // without features
+  std::optional<SeenFeatures> features;       // nothing: the server did not say
+  StageStamps stages;
+  Timestamp arrived_ns = 0;  // MonotonicNow() of this machine
+};
+
+/// One access unit, with the facts of its frame.
+struct CodedPicture {
+  std::shared_ptr<const FrameFacts> facts;
+  bool key_frame = false;
+  std::string data;  // H.264, Annex B
+};
+
+/// What changed in the map. Of a state in parts only the first is `full`: the others add to it.
+struct MapChange {
+  std::uint64_t generation = 0, revision = 0;
+  bool full = false;
+  std::vector<FeatureSnapshot> upserted;
+  std::vector<FeatureId> removed_ids;
+};
+
+using StreamEvent = std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange,
+                                 GazeSnapshot, Statistics, std::vector<Participant>, SourceEnd>;
+
+/// Times of one Ping [ns]: `sent` and `answered` on this machine's clock, the others on the
+/// server's.
+struct PingTimes {
+  Timestamp sent_ns = 0, received_ns = 0, replied_ns = 0, answered_ns = 0;
+};
+
+/// Everything that a session is told, pictures among it (raw view).
+///
+/// Read() blocks one thread; the other calls may come from other threads meanwhile.
+class Stream {
+ public:
+  /// Events in flight unacknowledged; acknowledge every quarter of them.
+  static constexpr std::uint32_t kWindow = 32;
+
+  Stream(const ConnectionOptions& options, std::string session_id);
+  ~Stream();
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+
+  /// Calls `on_event` for each event with its sequence number (0: nothing to deliver, the number
+  /// alone counts), until the server ends the stream (OK or an error, as of Connection) or
+  /// Cancel().
+  absl::Status Read(const std::function<void(std::uint64_t sequence,
+                                             std::optional<StreamEvent> event)>& on_event);
+  void Cancel();
+
+  /// Everything up to `sequence` has been taken. `request_key_frame`: the decoder lost its state.
+  absl::Status Acknowledge(std::uint64_t sequence, bool request_key_frame);
+  absl::StatusOr<PingTimes> Ping();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace saccade::net

@@ -1,0 +1,83 @@
+#include "client/tools/controls.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace saccade::tools {
+namespace {
+
+using enum Action;
+using enum Group;
+
+constexpr auto kControls = std::to_array<Control>({
+    {kSelect, kTool, "Select", "v", "V",
+     "click a mark to select it; drag a selected one to move it"},
+    {kInk, kTool, "Ink", "i", "I", "press and draw a stroke in the video"},
+    {kCube, kTool, "Cube", "c", "C", "click to place a cube, 5 cm where the scale is known"},
+    {kNote, kTool, "Note", "n", "N", "click to place a note, then type"},
+    {kArrow, kTool, "Arrow", "a", "A", "click to place an arrow"},
+    {kGaze, kTool, "Look", "g", "G", "click what the camera should look at and hold"},
+    {kUndo, kCommand, "Undo", "z", "Z", "take back your last change"},
+    {kRedo, kCommand, "Redo", "y", "Y", "do it again"},
+    {kDelete, kCommand, "Delete", "delete", "Del", "delete the selected mark"},
+    {kFreeze, kCommand, "Freeze", "p", "P", "hold the picture and click in it; again: go on"},
+    {kSwap, kCommand, "Swap", "s", "S", "swap the map and the video"},
+    {kFollow, kCommand, "Follow", "f", "F", "keep the wearer in view"},
+    {kWholeMap, kCommand, "Whole map", "h", "H", "bring the whole map into view"},
+    {kTop, kCommand, "From above", "8", "8", "look at the map from above"},
+    {kReset, kCommand, "Reset map", "r", "R", "forget the map and start anew"},
+    {kStop, kHead, "Stop", "x", "X", "stop the head where it is"},
+    {kHome, kHead, "Ahead", "0", "0", "look straight ahead (home)"},
+    {kLevel, kHead, "Level", "l", "L", "keep the direction, and the picture level"},
+    {kExplore, kHead, "Explore", "e", "E", "look round where the map is least certain"},
+    {kFast, kHead, "Fast", "t", "T", "turn as fast as the head can"},
+    {kLease, kHead, "Pilot", "q", "Q", "take the lease of the head, wait for it, or release it"},
+    {kOnlyMine, kMarks, "Only mine", "o", "O", "list and draw only your marks"},
+    {kHideMarks, kMarks, "Hide", "m", "M", "draw no marks; again: all"},
+    {kSnapshot, kMarks, "Snapshot", "k", "K", "keep the picture with its marks as a PNG"},
+    {kFind, kKeys, "Find", "/", "/", "find marks by text, shape, author"},
+    {kHelp, kKeys, "Help", "?", "?", "what the keys do"},
+    {kEscape, kKeys, "Leave", "escape", "Esc", "leave what is under way"},
+    {kNextTab, kKeys, "Next wearer", "ctrl+tab", "^Tab", "show the next server's tab"},
+});
+
+}  // namespace
+
+std::span<const Control> Controls() { return kControls; }
+
+const Control& ControlOf(Action action) {
+  return *std::find_if(kControls.begin(), kControls.end(),
+                       [action](const Control& control) { return control.action == action; });
+}
+
+std::optional<Action> ActionOf(const KeyPress& press) {
+  if (press.alt) return std::nullopt;
+  if (press.ctrl || press.super) {
+    if (press.key == "z") return press.shift ? kRedo : kUndo;
+    if (press.key == "y") return kRedo;
+    if (press.key == "tab") return kNextTab;
+    return std::nullopt;
+  }
+  if (press.key == "backspace") return kDelete;
+  for (const Control& control : kControls) {
+    if (press.key == control.key) return control.action;
+  }
+  return std::nullopt;
+}
+
+std::optional<AnnotationShape> ShapeOf(Action tool) {
+  switch (tool) {
+    case kInk:
+      return AnnotationShape::kInk;
+    case kCube:
+      return AnnotationShape::kCube;
+    case kNote:
+      return AnnotationShape::kNote;
+    case kArrow:
+      return AnnotationShape::kArrow;
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace saccade::tools

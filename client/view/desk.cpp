@@ -1,0 +1,244 @@
+#include "client/view/desk.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace saccade::view {
+namespace {
+
+constexpr double kFieldOfViewRad = std::numbers::pi / 4;
+
+}  // namespace
+
+Desk::Desk(session::SessionOptions options, std::string title, std::function<void()> wake)
+    : title_(std::move(title)),
+      player_(wake),
+      session_(std::move(options), player_, std::move(wake)) {}
+
+std::string Desk::title() const {
+  const std::string& source = session().joined.source;
+  return source.empty() ? title_ : source;
+}
+
+bool Desk::Poll(Timestamp now_ns) {
+  bool changed = session_.Poll();
+  if (std::optional<decode::Picture> picture = player_.Take()) {
+    live_ = std::move(picture);
+    changed = true;
+  }
+  changed = pilot_.Check() || changed;
+  changed = state_.Expire(now_ns) || changed;
+  // A still of a map that is gone shows marks where they are not.
+  if (state_.still && state_.still->picture.facts->pose && session().pose &&
+      session().pose->map_generation != state_.still->picture.facts->pose->map_generation) {
+    state_.still.reset();
+  }
+  return changed;
+}
+
+const decode::Picture* Desk::shown() const {
+  if (state_.still) return &state_.still->picture;
+  return live_ ? &*live_ : nullptr;
+}
+
+std::optional<tools::View> Desk::video_view() const {
+  const decode::Picture* picture = shown();
+  if (picture == nullptr || !session::IsPlaced(picture->facts->pose)) return std::nullopt;
+  return tools::View(picture->facts->camera, picture->facts->pose->world_from_camera);
+}
+
+tools::View Desk::map_view(const Rect& pane) const {
+  return {
+      tools::PinholeOf(std::max(1, static_cast<int>(std::lround(pane.width))),
+                       std::max(1, static_cast<int>(std::lround(pane.height))), kFieldOfViewRad),
+      orbit_.world_from_camera()};
+}
+
+bool Desk::same_map() const {
+  const decode::Picture* picture = shown();
+  return picture != nullptr && picture->facts->pose && session().pose &&
+         picture->facts->pose->map_revision == session().pose->map_revision;
+}
+
+/// A sphere round most features and the camera; stray ones do not count.
+std::optional<Desk::Framed> Desk::Bounds() const {
+  std::vector<Eigen::Vector3d> sure, all;
+  for (const auto& [id, feature] : session().features) {
+    all.push_back(feature.point_in_world);
+    if (feature.depth_known) sure.push_back(feature.point_in_world);
+  }
+  const std::vector<Eigen::Vector3d>& points = sure.size() >= 4 ? sure : all;
+  if (points.size() < 4) return std::nullopt;
+  Eigen::Vector3d centre;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector3d& point : points) values.push_back(point[axis]);
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    centre[axis] = values[values.size() / 2];
+  }
+  std::vector<double> away;
+  for (const Eigen::Vector3d& point : points) away.push_back((point - centre).norm());
+  std::sort(away.begin(), away.end());
+  const double most = away[static_cast<std::size_t>(0.85 * static_cast<double>(away.size()))];
+  double radius = std::max(most, 0.1);
+  if (session().pose) {
+    const double eye = (session().pose->world_from_camera.translation - centre).norm();
+    radius = std::max(radius, std::min(eye, 3 * most));
+  }
+  return Framed{centre, radius};
+}
+
+bool Desk::StepMap(double elapsed_ms) {
+  if (state_.following && live_ && session::IsPlaced(live_->facts->pose)) {
+    orbit_.Follow(live_->facts->pose->world_from_camera.translation);
+  } else if (!held_) {
+    if (const std::optional<Framed> bounds = Bounds()) {
+      const double moved =
+          framed_ ? (bounds->centre - framed_->centre).norm() / framed_->radius_m : 1;
+      const double grown = framed_ ? std::abs(std::log(bounds->radius_m / framed_->radius_m)) : 1;
+      if (moved > 0.3 || grown > 0.3) {
+        framed_ = bounds;
+        orbit_.LookAt(bounds->centre, bounds->radius_m);
+      }
+    }
+  }
+  return orbit_.Step(elapsed_ms);
+}
+
+void Desk::Shown(Timestamp shown_ns) {
+  if (!live_ || live_->facts->frame_id == counted_) return;
+  counted_ = live_->facts->frame_id;
+  rate_.Add(shown_ns);
+  if (const auto times = session::TimesOf(*live_->facts, live_->decoded_ns, shown_ns,
+                                          session().clock.offset_ns())) {
+    latency_.Add(*times);
+  }
+}
+
+void Desk::Freeze(Timestamp now_ns) {
+  if (state_.still) return state_.still.reset();
+  if (!live_) return state_.Refuse("Freeze", "There is no picture yet.", now_ns);
+  state_.still = Still{*live_, session().features, session().map_revision, now_ns, false};
+  const FrameId id = live_->facts->frame_id;
+  // The same picture as the server kept it: without what the coder lost, where it kept it whole.
+  edits_.FetchStill(id, net::VideoView::kRaw, [this, id](const absl::StatusOr<net::Still>& still) {
+    if (!still.ok() || !state_.still || state_.still->picture.facts->frame_id != id) return;
+    const cv::Mat bytes(1, static_cast<int>(still->png.size()), CV_8UC1,
+                        const_cast<char*>(still->png.data()));
+    cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR);
+    const cv::Mat& old = state_.still->picture.rgba;
+    if (picture.empty() || picture.cols < old.cols || picture.rows < old.rows) return;
+    cv::cvtColor(picture(cv::Rect(0, 0, old.cols, old.rows)), picture, cv::COLOR_BGR2RGBA);
+    state_.still->picture.rgba = picture;
+    state_.still->lossless = true;
+  });
+}
+
+/// The server draws the marks in, as for the wearer.
+void Desk::Snapshot(Timestamp now_ns) {
+  const decode::Picture* picture = shown();
+  if (picture == nullptr) return state_.Refuse("Snapshot", "There is no picture yet.", now_ns);
+  const FrameId id = picture->facts->frame_id;
+  edits_.FetchStill(
+      id, net::VideoView::kAugmented, [this](const absl::StatusOr<net::Still>& still) {
+        const std::string words = still.ok()
+                                      ? keep_snapshot(*still, *this)
+                                      : absl::StrCat("No snapshot: ", still.status().message());
+        state_.Refuse("Snapshot", words, MonotonicNow());
+      });
+}
+
+void Desk::Escape() {
+  if (state_.editor) {
+    state_.editor.reset();
+  } else if (state_.ink.drawing()) {
+    state_.ink.Cancel();
+  } else if (moving_) {
+    moving_.reset();
+    dragged_to_.reset();
+  } else if (state_.confirming_reset) {
+    state_.confirming_reset = false;
+  } else if (state_.tool != tools::Action::kSelect) {
+    state_.tool = tools::Action::kSelect;
+  } else if (state_.still) {
+    state_.still.reset();
+  } else {
+    state_.selected_id.clear();
+  }
+}
+
+void Desk::Run(tools::Action action, Timestamp now_ns) {
+  using enum tools::Action;
+  state_.hover.reset();
+  const tools::Control& control = tools::ControlOf(action);
+  if (control.group == tools::Group::kTool) {
+    const std::string why = action == kGaze ? WhyNoHead() : "";
+    if (!why.empty()) return state_.Refuse(control.label, why, now_ns);
+    state_.tool = action;
+    return;
+  }
+  if (control.group == tools::Group::kHead) return RunHead(action, now_ns);
+  switch (action) {
+    case kUndo:
+      return edits_.Undo(Tell(control.label));
+    case kRedo:
+      return edits_.Redo(Tell(control.label));
+    case kDelete:
+      if (!state_.selected_id.empty()) return Remove(state_.selected_id, now_ns);
+      return state_.Refuse(control.label, "Select a mark first.", now_ns);
+    case kFreeze:
+      return Freeze(now_ns);
+    case kSwap:
+      state_.main = state_.main == Pane::kMap ? Pane::kVideo : Pane::kMap;
+      return;
+    case kFollow:
+      state_.following = !state_.following;
+      return;
+    case kTop:
+      held_ = true;
+      orbit_.FromTop();
+      return;
+    case kWholeMap:
+      state_.following = false;
+      if (const auto bounds = Bounds()) orbit_.LookAt(bounds->centre, bounds->radius_m);
+      return;
+    case kReset:
+      state_.confirming_reset = !state_.confirming_reset;
+      return;
+    case kOnlyMine:
+      state_.filter.mine = !state_.filter.mine;
+      return;
+    case kHideMarks:
+      state_.hide_marks = !state_.hide_marks;
+      return;
+    case kSnapshot:
+      return Snapshot(now_ns);
+    case kFind:
+      state_.find = true;
+      return;
+    case kEscape:
+      return Escape();
+    default:
+      return;
+  }
+}
+
+void Desk::ConfirmReset(bool really, Timestamp /*now_ns*/) {
+  state_.confirming_reset = false;
+  if (really) edits_.ResetMap(Tell("Reset map"));
+}
+
+session::Edits::Done Desk::Tell(const Where& where, const std::string& before) {
+  return [this, where, before](const absl::StatusOr<std::string>& done) {
+    if (done.ok()) return;
+    state_.Refuse(where, absl::StrCat(before, done.status().message()), MonotonicNow());
+  };
+}
+
+}  // namespace saccade::view

@@ -1,0 +1,138 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "client/decode/player.hpp"
+#include "client/session/edits.hpp"
+#include "client/session/gaze_pilot.hpp"
+#include "client/session/latency.hpp"
+#include "client/session/session.hpp"
+#include "client/tools/orbit.hpp"
+#include "client/tools/view.hpp"
+#include "client/view/desk_state.hpp"
+#include "client/view/layout.hpp"
+
+namespace saccade::view {
+
+/// The picture in a pane: where its pixels stand in the window.
+struct Placement {
+  float left = 0, top = 0, scale = 1;
+  Eigen::Vector2d PixelAt(float x, float y) const {
+    return {(x - left) / scale - 0.5, (y - top) / scale - 0.5};
+  }
+};
+
+/// One wearer at this client: session, pictures, and what the person does. What a click or key
+/// does is decided here; drawing is elsewhere. The thread that draws.
+class Desk {
+ public:
+  /// `title`: what it is called until the server has told; `wake` may be called on any thread.
+  Desk(session::SessionOptions options, std::string title, std::function<void()> wake);
+
+  const session::State& session() const { return session_.state(); }
+  session::State& session() { return session_.state(); }
+  const session::GazePilot& pilot() const { return pilot_; }
+  DeskState& state() { return state_; }
+  const DeskState& state() const { return state_; }
+  tools::Orbit& orbit() { return orbit_; }
+  session::LatencyMeter& latency() { return latency_; }
+  session::RateMeter& rate() { return rate_; }
+  std::string title() const;
+  std::string video_problem() const { return player_.problem(); }
+
+  /// Takes what the threads have brought; true if it is to be drawn anew.
+  bool Poll(Timestamp now_ns);
+  /// The live picture on the screen; nothing before the first.
+  const std::optional<decode::Picture>& live() const { return live_; }
+  /// The one that the video pane shows: the still, or the live one.
+  const decode::Picture* shown() const;
+  /// The view of that picture; nothing while its place is not known.
+  std::optional<tools::View> video_view() const;
+  /// The eye above the map, for a pane of this size.
+  tools::View map_view(const Rect& pane) const;
+  /// False if the map has jumped since the frame shown: its pose says nothing about today's map.
+  bool same_map() const;
+  /// Eases the eye, follows the wearer, frames the map by itself until someone takes hold. True
+  /// while it moves.
+  bool StepMap(double elapsed_ms);
+  /// The picture was on the screen at that time.
+  void Shown(Timestamp shown_ns);
+
+  /// `where`: of the pointer, in the window.
+  void Run(tools::Action action, Timestamp now_ns);
+  void Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px);
+  void Drag(Pane pane, const Eigen::Vector2d& pixel);
+  /// `moved`: the pointer was dragged; `x`, `y`: in the window.
+  void Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, bool moved,
+               float x, float y, Timestamp now_ns);
+  void HoverAt(Pane pane, const std::optional<Eigen::Vector2d>& pixel, const tools::View* view,
+               double pick_px);
+  /// The map was moved by hand: it frames itself no more.
+  void Hold() { held_ = true; }
+  void Select(const std::string& id);
+  void Remove(const std::string& id, Timestamp now_ns);
+  void Paint(std::uint32_t color_rgba, Timestamp now_ns);
+  void LookAtMark(const std::string& id, const Where& where, Timestamp now_ns);
+  void EditText(const std::string& id, float x, float y);
+  /// Sends or drops what was written.
+  void FinishEditor(bool keep, Timestamp now_ns);
+  void ConfirmReset(bool really, Timestamp now_ns);
+  /// Which frame's picture was last pressed, and where; for tests.
+  const std::optional<PixelTarget>& pressed() const { return pressed_pixel_; }
+  bool dragging_mark() const { return moving_.has_value(); }
+  /// Where the mark that is dragged would be put [m].
+  const std::optional<Eigen::Vector3d>& dragged_to() const { return dragged_to_; }
+  /// Keeps a picture with its marks as a file, and says where; set by whoever knows where.
+  std::function<std::string(const net::Still&, const Desk&)> keep_snapshot;
+
+ private:
+  std::optional<tools::Landing> LandingAt(Pane pane, const Eigen::Vector2d& pixel,
+                                          const tools::View* view) const;
+  std::string WhyNoLanding(Pane pane) const;
+  std::vector<Annotation> Drawn() const;
+  void Freeze(Timestamp now_ns);
+  void Snapshot(Timestamp now_ns);
+  void Escape();
+  void RunHead(tools::Action action, Timestamp now_ns);
+  void Place(AnnotationShape shape, const tools::Landing& landing, const std::string& text,
+             std::vector<Eigen::Vector2d> ink, const Where& where);
+  void Look(const tools::Landing& landing, const Where& where, Timestamp now_ns);
+  void Fixate(const GazeTarget& target, const Eigen::Vector3d& point, const Where& where,
+              Timestamp now_ns);
+  std::string WhyNoHead() const;
+  /// Shows a refusal where it was asked for.
+  session::Edits::Done Tell(const Where& where, const std::string& before = "");
+
+  const std::string title_;
+  DeskState state_;
+  decode::Player player_;
+  session::Session session_;  // after player_: it pushes there
+  session::Edits edits_{session_};
+  session::GazePilot pilot_{session_};
+  session::LatencyMeter latency_;
+  session::RateMeter rate_;
+  tools::Orbit orbit_;
+  std::optional<decode::Picture> live_;
+  FrameId counted_ = 0;  // the frame whose latency was taken
+  bool held_ = false;
+  struct Framed {
+    Eigen::Vector3d centre;
+    double radius_m;
+  };
+  std::optional<Framed> Bounds() const;
+  std::optional<Framed> framed_;
+  // What was under the pointer when it went down: the picture may change before it comes up.
+  struct Pressed {
+    std::optional<tools::Landing> landing;
+    std::string picked_id;
+  };
+  std::optional<Pressed> pressed_;
+  std::optional<PixelTarget> pressed_pixel_;
+  std::optional<std::string> moving_;  // id of the mark that is dragged
+  std::optional<Eigen::Vector3d> dragged_to_;
+};
+
+}  // namespace saccade::view

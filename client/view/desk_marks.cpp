@@ -1,0 +1,269 @@
+// What clicks and keys do to marks and gaze.
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/tools/words.hpp"
+#include "client/view/desk.hpp"
+
+namespace saccade::view {
+namespace {
+
+const char* NameOf(Pane pane) { return pane == Pane::kMap ? "map" : "video"; }
+
+template <typename T, typename Value>
+AnnotationPatch PatchOf(const std::string& id, T AnnotationPatch::*field, Value&& value) {
+  AnnotationPatch patch;
+  patch.id = id;
+  patch.*field = std::forward<Value>(value);
+  return patch;
+}
+
+/// One line without control characters, as the server takes it.
+std::string CleanText(const std::string& text) {
+  std::string clean;
+  for (const char c : text) clean += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+  const auto first = clean.find_first_not_of(' ');
+  if (first == std::string::npos) return "";
+  return clean.substr(first, clean.find_last_not_of(' ') - first + 1);
+}
+
+}  // namespace
+
+std::vector<Annotation> Desk::Drawn() const {
+  std::vector<Annotation> drawn = session().annotations.List();
+  std::erase_if(drawn, [this](const Annotation& each) { return !state_.Draws(each); });
+  return drawn;
+}
+
+std::optional<tools::Landing> Desk::LandingAt(Pane pane, const Eigen::Vector2d& pixel,
+                                              const tools::View* view) const {
+  if (view == nullptr) return std::nullopt;
+  if (pane == Pane::kMap) return tools::LandingInMap(*view, pixel, session().features);
+  const decode::Picture* picture = shown();
+  if (picture == nullptr || !view->camera->InImage(pixel, -0.5)) return std::nullopt;
+  auto landing = tools::LandingInVideo(*view, picture->facts->frame_id, pixel, session().features);
+  // A frozen picture is clicked late, a note is placed when its text is done.
+  const bool late = state_.still || state_.tool == tools::Action::kNote;
+  if (landing && late && same_map()) {
+    if (const auto ray = tools::RayThrough(*view, pixel)) landing->later = *ray;
+  }
+  return landing;
+}
+
+std::string Desk::WhyNoLanding(Pane pane) const {
+  if (pane == Pane::kMap) return "nothing is mapped there.";
+  if (shown() == nullptr) return "there is no picture yet.";
+  return video_view() ? "that is outside the picture." : "where the camera is is not known now.";
+}
+
+void Desk::HoverAt(Pane pane, const std::optional<Eigen::Vector2d>& pixel, const tools::View* view,
+                   double pick_px) {
+  if (state_.tool == tools::Action::kSelect) {
+    state_.hover.reset();
+    const Annotation* picked = nullptr;
+    const std::vector<Annotation> drawn = Drawn();
+    if (pixel && view != nullptr) picked = tools::PickNearest(*view, *pixel, drawn, pick_px);
+    state_.pointed_id = picked == nullptr ? "" : picked->id;
+  } else if (pixel) {
+    state_.hover = Hover{pane, *pixel, LandingAt(pane, *pixel, view)};
+  } else if (state_.hover && state_.hover->pane == pane) {
+    state_.hover.reset();
+  }
+}
+
+void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px) {
+  pressed_ = Pressed{LandingAt(pane, pixel, view), ""};
+  const decode::Picture* picture = shown();
+  if (pane == Pane::kVideo && picture != nullptr) {
+    pressed_pixel_ = PixelTarget{picture->facts->frame_id, pixel};
+  }
+  const std::vector<Annotation> drawn = Drawn();
+  if (view != nullptr) {
+    if (const Annotation* picked = tools::PickNearest(*view, pixel, drawn, pick_px)) {
+      pressed_->picked_id = picked->id;
+    }
+  }
+  if (state_.tool == tools::Action::kInk && pane == Pane::kVideo && pressed_->landing) {
+    // One stroke is of one picture: it stands still until the stroke is done.
+    if (!state_.still) Freeze(MonotonicNow());
+    state_.ink.Begin(picture->facts->frame_id, pixel);
+  }
+  const bool selected = !pressed_->picked_id.empty() && pressed_->picked_id == state_.selected_id;
+  if (state_.tool == tools::Action::kSelect && selected) moving_ = pressed_->picked_id;
+}
+
+void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel) {
+  if (state_.ink.drawing() && pane == Pane::kVideo) state_.ink.Add(pixel);
+}
+
+void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, bool moved,
+                   float x, float y, Timestamp now_ns) {
+  if (!pressed_) return;
+  const Pressed pressed = *std::exchange(pressed_, std::nullopt);
+  const Where where = NameOf(pane);
+  if (state_.ink.drawing()) {
+    std::vector<Eigen::Vector2d> ink = state_.ink.Finish();
+    if (ink.empty()) return state_.Refuse(where, "Not placed: press and draw a stroke.", now_ns);
+    Place(AnnotationShape::kInk, *pressed.landing, "", std::move(ink), where);
+    state_.still.reset();
+    return;
+  }
+  if (moving_ && moved) {
+    const std::string id = *std::exchange(moving_, std::nullopt);
+    const std::optional<tools::Landing> landing = LandingAt(pane, pixel, view);
+    if (!landing) {
+      return state_.Refuse(where, absl::StrCat("Not moved: ", WhyNoLanding(pane)), now_ns);
+    }
+    return edits_.Update(PatchOf(id, &AnnotationPatch::target, landing->target),
+                         Tell(where, "Not moved: "));
+  }
+  moving_.reset();
+  if (moved) return;
+  const auto refuse = [&](const char* what) {
+    state_.Refuse(where, absl::StrCat(what, WhyNoLanding(pane)), now_ns);
+  };
+  if (state_.tool == tools::Action::kGaze) {
+    if (!pressed.picked_id.empty()) return LookAtMark(pressed.picked_id, where, now_ns);
+    if (!pressed.landing) return refuse("Not turned: ");
+    return Look(*pressed.landing, where, now_ns);
+  }
+  const std::optional<AnnotationShape> shape = tools::ShapeOf(state_.tool);
+  if (!shape) {
+    state_.selected_id = pressed.picked_id;
+    return;
+  }
+  if (!session().link.live()) {
+    return state_.Refuse(where, "Not placed: no connection to the server.", now_ns);
+  }
+  if (!pressed.landing) return refuse("Not placed: ");
+  if (*shape == AnnotationShape::kInk) {
+    return state_.Refuse(where, "Not placed: ink is drawn in the video.", now_ns);
+  }
+  if (*shape == AnnotationShape::kNote) {
+    state_.editor = TextEditor{pressed.landing, "", pane, x, y, "", false};
+    return;
+  }
+  Place(*shape, *pressed.landing, "", {}, where);
+}
+
+void Desk::Place(AnnotationShape shape, const tools::Landing& landing, const std::string& text,
+                 std::vector<Eigen::Vector2d> ink, const Where& where) {
+  session::Edits::Placement placement;
+  placement.draft.shape = shape;
+  placement.draft.text = text;
+  placement.draft.color_rgba = state_.color_rgba;
+  placement.draft.target = landing.target;
+  placement.draft.ink_px = std::move(ink);
+  if (shape != AnnotationShape::kInk) {
+    placement.later = landing.later;
+    placement.guess_in_world = landing.point_in_world;
+  }
+  const session::Edits::Done tell = Tell(where, "Not placed: ");
+  edits_.Place(std::move(placement), [this, tell](const absl::StatusOr<std::string>& id) {
+    if (id.ok()) state_.selected_id = *id;
+    tell(id);
+  });
+}
+
+void Desk::Select(const std::string& id) {
+  state_.selected_id = state_.selected_id == id ? "" : id;
+}
+
+void Desk::Remove(const std::string& id, Timestamp /*now_ns*/) {
+  if (state_.selected_id == id) state_.selected_id.clear();
+  edits_.Remove(id, Tell(absl::StrCat("annotation ", id)));
+}
+
+void Desk::Paint(std::uint32_t color_rgba, Timestamp /*now_ns*/) {
+  state_.color_rgba = color_rgba;
+  const std::string& id = state_.selected_id;
+  if (id.empty()) return;
+  edits_.Update(PatchOf(id, &AnnotationPatch::color_rgba, color_rgba),
+                Tell(absl::StrCat("annotation ", id)));
+}
+
+void Desk::EditText(const std::string& id, float x, float y) {
+  const Annotation* annotation = session().annotations.Find(id);
+  if (annotation == nullptr) return;
+  state_.editor = TextEditor{std::nullopt, id, Pane::kMap, x, y, annotation->text, false};
+}
+
+void Desk::FinishEditor(bool keep, Timestamp now_ns) {
+  if (!state_.editor) return;
+  const TextEditor editor = *std::exchange(state_.editor, std::nullopt);
+  const std::string text = CleanText(editor.text);
+  if (!keep) return;
+  if (!editor.id.empty()) {
+    return edits_.Update(PatchOf(editor.id, &AnnotationPatch::text, text),
+                         Tell(absl::StrCat("annotation ", editor.id)));
+  }
+  if (text.empty()) {
+    return state_.Refuse(NameOf(editor.pane), "Not placed: a note needs a text.", now_ns);
+  }
+  Place(AnnotationShape::kNote, *editor.landing, text, {}, NameOf(editor.pane));
+}
+
+std::string Desk::WhyNoHead() const {
+  if (!session().link.live()) return "No connection to the server.";
+  if (tools::HasHead(session())) return "";
+  return "This camera is fixed to the wearer: there is no head to turn. Ask the wearer to look "
+         "there.";
+}
+
+void Desk::RunHead(tools::Action action, Timestamp now_ns) {
+  if (action == tools::Action::kFast) {
+    state_.fast = !state_.fast;
+    return;
+  }
+  const std::string why = WhyNoHead();
+  if (!why.empty()) return state_.Refuse("head", why, now_ns);
+  switch (action) {
+    case tools::Action::kStop:
+      return pilot_.Run(&net::Connection::StopFixating, Tell("head"));
+    case tools::Action::kHome:
+      return pilot_.Run(&net::Connection::Home, Tell("head"));
+    case tools::Action::kLevel:
+      return pilot_.Run(&net::Connection::KeepHorizon, Tell("head"));
+    case tools::Action::kExplore:
+      return pilot_.Run(&net::Connection::Explore, Tell("head"));
+    default:
+      return pilot_.Toggle(Tell("head"));
+  }
+}
+
+void Desk::Look(const tools::Landing& landing, const Where& where, Timestamp now_ns) {
+  if (where == "video" && state_.still && !same_map()) {
+    return state_.Refuse(where, "Not turned: the map has changed since this picture.", now_ns);
+  }
+  GazeTarget target = GazePoint{landing.point_in_world};
+  if (const auto* feature = std::get_if<FeatureTarget>(&landing.target)) {
+    target = GazeFeature{feature->feature_id};
+  }
+  Fixate(target, landing.point_in_world, where, now_ns);
+}
+
+void Desk::LookAtMark(const std::string& id, const Where& where, Timestamp now_ns) {
+  const Annotation* annotation = session().annotations.Find(id);
+  if (annotation == nullptr) return;
+  if (!annotation->anchor.place_known) {
+    return state_.Refuse(where, "Not turned: the place of this mark is not known.", now_ns);
+  }
+  Fixate(GazeAnnotation{id}, annotation->anchor.point_in_world, where, now_ns);
+}
+
+void Desk::Fixate(const GazeTarget& target, const Eigen::Vector3d& point, const Where& where,
+                  Timestamp now_ns) {
+  const std::string why = WhyNoHead();
+  if (!why.empty()) return state_.Refuse(where, why, now_ns);
+  state_.asked_in_world = point;
+  pilot_.Fixate(
+      target, state_.fast,
+      [this, tell = Tell(where, "Not turned: ")](const absl::StatusOr<std::string>& done) {
+        state_.asked_in_world.reset();
+        tell(done);
+      });
+}
+
+}  // namespace saccade::view

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/decode/player.hpp"
+#include "client/tools/controls.hpp"
+#include "client/tools/landing.hpp"
+#include "client/tools/marks.hpp"
+#include "client/view/layout.hpp"
+
+namespace saccade::view {
+
+enum class Pane { kMap, kVideo };
+
+/// Where a refusal is shown: beside what could not be done. A control's label, "map", "video",
+/// "head", or "annotation " and its id.
+using Where = std::string;
+
+struct Hover {
+  Pane pane = Pane::kMap;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // of the pane's view
+  std::optional<tools::Landing> landing;
+};
+
+/// A picture held on the screen, with the features of its map.
+struct Still {
+  decode::Picture picture;
+  tools::Features features;
+  std::uint64_t map_revision = 0;
+  Timestamp since_ns = 0;
+  bool lossless = false;  // the server's own, by GetFrame
+};
+
+/// A note that is written, or a mark's text that is changed.
+struct TextEditor {
+  std::optional<tools::Landing> landing;  // of a new note
+  std::string id;                         // of a mark that is there; empty: a new note
+  Pane pane = Pane::kMap;
+  float x = 0, y = 0;  // in the window
+  std::string text;
+  bool opened = false;  // has had the keyboard
+};
+
+/// What this person is doing with one wearer. The thread that draws.
+class DeskState {
+ public:
+  tools::Action tool = tools::Action::kSelect;
+  std::string selected_id, pointed_id;
+  std::optional<Hover> hover;
+  Pane main = Pane::kMap;
+  bool confirming_reset = false;
+  tools::MarkFilter filter;
+  bool hide_marks = false;
+  std::string my_name;
+  std::uint32_t color_rgba = 0xffffffff;  // of new marks
+  bool fast = false;                      // the head turns as fast as it can
+  bool following = false;
+  bool find = false;  // the field wants the keyboard
+  std::optional<Still> still;
+  std::optional<TextEditor> editor;
+  std::vector<Rect> above;  // what lies over the panes, of the picture on the screen
+  tools::InkLine ink;
+  /// What the camera was asked to look at, until the server says that it does.
+  std::optional<Eigen::Vector3d> asked_in_world;
+
+  /// True if it is drawn: a selected one always is.
+  bool Draws(const Annotation& annotation) const {
+    if (annotation.id == selected_id) return true;
+    return !hide_marks && tools::Passes(annotation, filter, my_name);
+  }
+
+  void Refuse(const Where& where, const std::string& text, Timestamp now_ns) {
+    refusals_[where] = {text, now_ns + 6'000'000'000};
+  }
+  /// Empty: nothing was refused there of late.
+  std::string Refusal(const Where& where) const {
+    const auto found = refusals_.find(where);
+    return found == refusals_.end() ? "" : found->second.text;
+  }
+  /// Forgets refusals that have been read; true if there were any.
+  bool Expire(Timestamp now_ns) {
+    return std::erase_if(refusals_, [now_ns](const auto& entry) {
+             return entry.second.until_ns <= now_ns;
+           }) > 0;
+  }
+  bool refusing() const { return !refusals_.empty(); }
+
+ private:
+  struct Refused {
+    std::string text;
+    Timestamp until_ns = 0;
+  };
+  std::map<Where, Refused> refusals_;
+};
+
+}  // namespace saccade::view

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/view/desk.hpp"
+#include "client/view/layout.hpp"
+#include "client/view/theme.hpp"
+
+/// Everything round the panes, by ImGui. Each reads the desk and calls what a person chose.
+namespace saccade::view {
+
+/// What all panels need.
+struct PanelContext {
+  Desk& desk;
+  const Fonts& fonts;
+  Timestamp now_ns = 0;
+  float scale = 1;
+};
+
+/// What is watched, how tracking is and what to do about it, rates, who is here. True: the help was
+/// asked for.
+bool DrawHeader(const PanelContext& context, const Rect& rect);
+/// One tab a server; returns the one to show.
+std::size_t DrawTabs(const std::vector<Desk*>& desks, std::size_t shown, const Rect& rect,
+                     Timestamp now_ns);
+/// Tools and commands, the current one unmistakable, refusals beside what could not be done.
+void DrawTools(const PanelContext& context, const Rect& rect);
+/// Every annotation with its state and live error; the colour of new ones; finding them.
+void DrawAnnotations(const PanelContext& context, const Rect& rect);
+/// What the head does, how far off it is, who steers it, and what can be asked of it.
+void DrawGaze(const PanelContext& context, const Rect& rect);
+/// Where the time goes, and what was lost.
+void DrawStrip(const PanelContext& context, const Rect& rect);
+/// The field in which a note or a mark's text is written; nothing while none is.
+void DrawEditor(const PanelContext& context, const Rect& within);
+/// What the keys do and what the colours mean, over everything. `open` false: does nothing.
+void DrawHelp(const PanelContext& context, bool& open);
+
+/// A button with its key; true when pressed. `on`: it is the current one.
+bool ControlButton(const tools::Control& control, bool on, float width, const Fonts& fonts);
+/// A fixed, borderless window that fills `rect`.
+bool BeginPanel(const char* name, const Rect& rect, ImU32 color, bool scrolls = false);
+void EndPanel();
+/// Clicks there are not for the panes: of the ImGui window that is being drawn.
+void NoteAbove(Desk& desk);
+
+}  // namespace saccade::view

@@ -1,0 +1,80 @@
+#include "client/view/theme.hpp"
+
+#include <filesystem>
+#include <string>
+
+namespace saccade::view {
+namespace {
+
+constexpr const char* kFolder = "/usr/share/fonts/truetype/dejavu/";
+constexpr float kTextPx = 14;
+// Latin, Greek, Cyrillic; punctuation; arrows, signs and geometric shapes.
+constexpr ImWchar kRanges[] = {0x20,   0x24f,  0x370,  0x52f,  0x2010, 0x205e, 0x2190, 0x21ff,
+                               0x2200, 0x22ff, 0x25a0, 0x2612, 0x2713, 0x2718, 0};
+
+ImFont* Load(const char* name, float size_px) {
+  const std::string file = std::string(kFolder) + name;
+  if (!std::filesystem::exists(file)) return nullptr;
+  ImFontConfig config;
+  config.OversampleH = 2;
+  config.PixelSnapH = true;
+  return ImGui::GetIO().Fonts->AddFontFromFileTTF(file.c_str(), size_px, &config, kRanges);
+}
+
+void Colour(ImGuiCol which, ImU32 color) {
+  ImGui::GetStyle().Colors[which] = ImGui::ColorConvertU32ToFloat4(color);
+}
+
+}  // namespace
+
+ImU32 ColorOf(FeatureState state) {
+  switch (state) {
+    case FeatureState::kMeasured:
+      return IM_COL32(0xff, 0x5a, 0x4d, 255);
+    case FeatureState::kFailed:
+      return IM_COL32(0x4d, 0xa3, 0xff, 255);
+    case FeatureState::kNotAttempted:
+      break;
+  }
+  return IM_COL32(0xff, 0xd8, 0x4d, 255);
+}
+
+absl::Status ApplyTheme(float scale, Fonts& fonts) {
+  ImGuiStyle style;
+  style.WindowRounding = style.ChildRounding = 0;
+  style.FrameRounding = style.PopupRounding = style.GrabRounding = 4;
+  style.WindowBorderSize = style.ChildBorderSize = 0;
+  style.WindowPadding = {12, 8};
+  style.FramePadding = {8, 5};
+  style.ItemSpacing = {8, 6};
+  style.ScrollbarSize = 10;
+  style.ScaleAllSizes(scale);
+  ImGui::GetStyle() = style;
+  ImGui::StyleColorsDark();
+  Colour(ImGuiCol_WindowBg, kPanel);
+  Colour(ImGuiCol_PopupBg, kRaised);
+  Colour(ImGuiCol_Text, kText);
+  Colour(ImGuiCol_TextDisabled, kDim);
+  Colour(ImGuiCol_Border, kLine);
+  Colour(ImGuiCol_FrameBg, kBar);
+  Colour(ImGuiCol_FrameBgHovered, kRaised);
+  Colour(ImGuiCol_FrameBgActive, kRaised);
+  Colour(ImGuiCol_Button, kRaised);
+  Colour(ImGuiCol_ButtonHovered, kLine);
+  Colour(ImGuiCol_ButtonActive, kLine);
+  Colour(ImGuiCol_Header, kRaised);
+  Colour(ImGuiCol_HeaderHovered, kRaised);
+  Colour(ImGuiCol_HeaderActive, kLine);
+  Colour(ImGuiCol_ScrollbarBg, kPanel);
+  Colour(ImGuiCol_ScrollbarGrab, kLine);
+  Colour(ImGuiCol_CheckMark, kAccent);
+  Colour(ImGuiCol_NavHighlight, kAccent);
+  Colour(ImGuiCol_TextSelectedBg, IM_COL32(0xc4, 0xb0, 0xff, 90));
+  ImGui::GetIO().Fonts->Clear();
+  fonts.text = Load("DejaVuSans.ttf", kTextPx * scale);
+  fonts.bold = Load("DejaVuSans-Bold.ttf", kTextPx * scale);
+  if (fonts.text != nullptr && fonts.bold != nullptr) return absl::OkStatus();
+  return absl::NotFoundError(std::string("no fonts in ") + kFolder + ": install fonts-dejavu-core");
+}
+
+}  // namespace saccade::view

@@ -1,0 +1,143 @@
+// What a person does in the window beside clicking cubes: writes a note, draws ink, undoes, turns the head,
+// changes between two wearers.
+import { join } from 'node:path';
+import { startServer } from '../../web/test/browser/server.mjs';
+
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+export async function runWork(context) {
+  context.server = await context.start(['--mount', 'sim']);
+  context.truth = context.openTruth();
+  const other = await startServer(context.options.server, [
+    ...['--source', 'sim:desk?motion=still&seed=7', '--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
+    ...['--data-dir', join(context.folder, 'other')],
+  ]);
+  try {
+    context.desktop = await context.startDesktop(['--server', other.grpc, '--name', 'Tess']);
+    await context.desktop.until('tracking', ({ status }) => status.startsWith('tracking'), 90_000);
+    await note(context);
+    await ink(context);
+    await undo(context);
+    await head(context);
+    await tabs(context);
+    const { ms, code } = await context.desktop.stop('SIGTERM');
+    context.desktop = undefined;
+    context.check('ends on SIGTERM within 2 s', ms < 2000 && code === 0, `${ms.toFixed(0)} ms, code ${code}`);
+  } finally {
+    await other.stop();
+  }
+}
+
+/** Where an object of the simulator's is on the screen now. */
+function objectIn({ desktop, truth }, which = 0) {
+  const { video } = desktop.look();
+  const inside = ([u, v]) => u > 60 && v > 60 && u < video.width - 60 && v < video.height - 60;
+  const objects = (truth.frame(video.frame)?.objects ?? []).filter(
+    ({ visible, pixel }) => visible && pixel && inside(pixel),
+  );
+  const object = objects[which % Math.max(objects.length, 1)];
+  if (!object) return undefined;
+  const [u, v] = object.pixel;
+  return [video.left + (u + 0.5) * video.scale, video.top + (v + 0.5) * video.scale];
+}
+
+async function findObject(context, which) {
+  for (let i = 0; i < 100; ++i) {
+    const at = objectIn(context, which);
+    if (at) return at;
+    await sleep(100);
+  }
+  throw new Error('no object of the simulator came into view');
+}
+
+const marked = (before) => (shown) => shown.marks.some(({ id }) => !before.has(id));
+const idsOf = ({ marks }) => new Set(marks.map(({ id }) => id));
+
+async function note(context) {
+  const { desktop, screen, check } = context;
+  await desktop.enlarge('video');
+  screen.press('n');
+  await desktop.until('the note is in hand', ({ tool }) => tool === 'Note');
+  screen.click(await findObject(context, 0));
+  await desktop.until('the field', ({ editing }) => editing);
+  await sleep(300);
+  screen.input('type', '--delay', '40', 'check the seal');
+  await sleep(200);
+  context.shot('note');
+  const before = idsOf(desktop.look());
+  screen.press('Return');
+  const shown = await desktop.until('the note', marked(before));
+  const mark = shown.marks.find(({ id }) => !before.has(id));
+  const kept = context.annotations().find(({ id }) => id === mark.id);
+  check(
+    'a note is what was typed, by whom it was, and letters are no tools meanwhile',
+    kept?.text === 'check the seal' && kept.author === 'Tess' && shown.tool === 'Note',
+    `"${kept?.text}" by ${kept?.author}`,
+  );
+}
+
+async function ink(context) {
+  const { desktop, screen, check } = context;
+  screen.press('i');
+  await desktop.until('ink is in hand', ({ tool }) => tool === 'Ink');
+  const before = idsOf(desktop.look());
+  const [x, y] = await findObject(context, 1);
+  screen.move([x - 40, y]);
+  screen.input('mousedown', 1);
+  for (let i = -40; i <= 40; i += 8) screen.move([x + i, y + 12 * Math.sin(i / 8)]);
+  screen.input('mouseup', 1);
+  const shown = await desktop.until('the stroke', (now) => marked(before)(now) || now.refused.video !== '');
+  const mark = shown.marks.find(({ id }) => !before.has(id));
+  const kept = context.annotations().find(({ id }) => id === mark?.id);
+  check('a stroke drawn with the mouse is ink', kept?.shape === 'ink', kept?.shape ?? shown.refused.video);
+  await desktop.until('live again', ({ video }) => !video.frozen);
+}
+
+async function undo(context) {
+  const { desktop, screen, check } = context;
+  const before = desktop.look().marks.length;
+  screen.press('z');
+  await desktop.until('one mark less', ({ marks }) => marks.length === before - 1);
+  screen.press('y');
+  await desktop.until('and back', ({ marks }) => marks.length === before);
+  screen.press('v', 'Escape');
+  screen.press('Delete');
+  await sleep(300);
+  check('undo and redo by their keys', true, `${before} marks, ${before - 1}, ${before}`);
+}
+
+async function head(context) {
+  const { desktop, screen, check } = context;
+  screen.press('g');
+  await desktop.until('looking is in hand', ({ tool }) => tool === 'Look');
+  screen.click(await findObject(context, 2));
+  const begin = performance.now();
+  const turning = await desktop.until(
+    'the head turns',
+    ({ gaze, refused }) => gaze === 'saccade' || gaze === 'fixate' || refused.video !== '',
+  );
+  check('a click turns the head, by a lease', turning.lease === 2, `${turning.gaze}; ${turning.refused.video || 'lease held'}`);
+  await desktop.until('it holds', ({ arrived }) => arrived, 15_000);
+  context.shot('gaze');
+  check('and it holds what was clicked', true, `after ${(performance.now() - begin).toFixed(0)} ms`);
+  screen.press('0');
+  await desktop.until('home', ({ gaze }) => gaze === 'home');
+  screen.press('q');
+  const released = await desktop.until('the lease is given back', ({ lease }) => lease === 0);
+  check('home and release by their keys', released.lease === 0, released.gaze);
+  screen.press('v');
+}
+
+async function tabs(context) {
+  const { desktop, screen, check } = context;
+  const first = desktop.look();
+  screen.press('ctrl+Tab');
+  const second = await desktop.until('the other wearer', ({ tab, video }) => tab === 1 && video !== null, 20_000);
+  await desktop.until('tracking there', ({ status }) => status.startsWith('tracking'), 60_000);
+  context.shot('tabs');
+  check(
+    'another server is another tab, with its own marks',
+    second.marks.length === 0 && first.marks.length > 0,
+    `${first.marks.length} marks here, ${second.marks.length} there`,
+  );
+}

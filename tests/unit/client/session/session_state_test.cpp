@@ -1,0 +1,150 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/session/acknowledger.hpp"
+#include "client/session/latency.hpp"
+#include "client/session/state.hpp"
+
+namespace saccade::session {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::SizeIs;
+constexpr Timestamp kMs = 1'000'000;
+
+Annotation Named(const std::string& id, std::int64_t created) {
+  Annotation annotation;
+  annotation.id = id;
+  annotation.created_unix_ns = created;
+  return annotation;
+}
+
+std::vector<std::string> IdsOf(const std::vector<Annotation>& annotations) {
+  std::vector<std::string> ids;
+  for (const Annotation& each : annotations) ids.push_back(each.id);
+  return ids;
+}
+
+TEST(AnnotationBook, ALateAnswerDoesNotBringBackWhatIsGone) {
+  AnnotationBook book;
+  book.Apply(
+      {.full = true, .upserted = {Named("b", 2), Named("a", 1)}, .removed_ids = {}, .anchors = {}});
+  EXPECT_THAT(IdsOf(book.List()), ElementsAre("a", "b")) << "oldest first";
+  book.Apply({.full = false, .upserted = {}, .removed_ids = {"a"}, .anchors = {}});
+  book.Put(Named("a", 1));
+  EXPECT_THAT(IdsOf(book.List()), ElementsAre("b"));
+}
+
+TEST(AnnotationBook, WhatIsBeingDeletedIsHiddenAndComesBackIfRefused) {
+  AnnotationBook book;
+  book.Put(Named("a", 1));
+  book.Hide("a");
+  EXPECT_THAT(book.List(), SizeIs(0));
+  EXPECT_EQ(book.Find("a"), nullptr);
+  book.Show("a");
+  EXPECT_THAT(book.List(), SizeIs(1));
+}
+
+TEST(AnnotationBook, AnchorsMoveWithoutTheirStroke) {
+  AnnotationBook book;
+  Annotation ink = Named("a", 1);
+  ink.ink_offset_m = {{0, 0, 0}, {1, 0, 0}};
+  book.Put(ink);
+  net::AnchorUpdate update{"a", {}};
+  update.anchor.point_in_world = {1, 2, 3};
+  book.Apply({.full = false, .upserted = {}, .removed_ids = {}, .anchors = {update}});
+  EXPECT_EQ(book.Find("a")->anchor.point_in_world, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(book.Find("a")->ink_offset_m.size(), 2u);
+}
+
+TEST(State, AMapInPartsIsPutTogetherAndAResetForgetsIt) {
+  State state;
+  const auto feature = [](FeatureId id) {
+    FeatureSnapshot f;
+    f.id = id;
+    return f;
+  };
+  state.Apply(net::MapChange{1, 1, true, {feature(1)}, {}}, 0);
+  state.Apply(net::MapChange{1, 1, false, {feature(2)}, {}}, 0);
+  EXPECT_THAT(state.features, SizeIs(2));
+  state.Apply(net::MapChange{1, 1, false, {}, {1}}, 0);
+  EXPECT_THAT(state.features, SizeIs(1));
+  state.Apply(net::MapChange{2, 2, false, {feature(1)}, {}}, 0);
+  EXPECT_EQ(state.features.begin()->first, 1u);
+  EXPECT_THAT(state.features, SizeIs(1));
+}
+
+TEST(State, ThePathEndsWhereTheMapJumpsAndHasNoLostPoses) {
+  State state;
+  MapSnapshot pose;
+  pose.status = TrackingStatus::kTracking;
+  for (int i = 0; i < 10; ++i) {
+    pose.world_from_camera.translation.x() = 0.002 * i;  // 5 mm apart are kept
+    state.Apply(pose, 0);
+  }
+  EXPECT_THAT(state.path, SizeIs(4));
+  pose.status = TrackingStatus::kLost;
+  pose.world_from_camera.translation.x() = 9;
+  state.Apply(pose, 0);
+  EXPECT_THAT(state.path, SizeIs(4));
+  pose.status = TrackingStatus::kTracking;
+  pose.map_revision = 1;
+  state.Apply(pose, 0);
+  EXPECT_THAT(state.path, SizeIs(1));
+}
+
+TEST(Acknowledger, SpeaksEveryEighthEventAndHoldsBackWhileTheDecoderIsBehind) {
+  Acknowledger acknowledger(8, 0);
+  acknowledger.Arrived(7);
+  EXPECT_FALSE(acknowledger.Due(10 * kMs, false));
+  acknowledger.Arrived(8);
+  EXPECT_FALSE(acknowledger.Due(10 * kMs, /*behind=*/true));
+  const auto message = acknowledger.Due(20 * kMs, false);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->sequence, 8u);
+  acknowledger.Sent(*message, true);
+  EXPECT_FALSE(acknowledger.Due(1900 * kMs, false));
+  EXPECT_TRUE(acknowledger.Due(2100 * kMs, false)) << "a sign of life";
+}
+
+TEST(Acknowledger, AKeyFrameIsAskedForUntilTheAskingHasArrived) {
+  Acknowledger acknowledger(8, 0);
+  acknowledger.Arrived(3);
+  acknowledger.RequestKeyFrame();
+  const auto first = acknowledger.Due(kMs, true);
+  ASSERT_TRUE(first && first->request_key_frame);
+  acknowledger.Sent(*first, /*arrived=*/false);
+  const auto second = acknowledger.Due(2 * kMs, true);
+  ASSERT_TRUE(second && second->request_key_frame);
+  acknowledger.Sent(*second, true);
+  EXPECT_FALSE(acknowledger.Due(3 * kMs, true));
+}
+
+TEST(ClockOffset, IsTheQuickestPings) {
+  ClockOffset clock;
+  EXPECT_EQ(clock.offset_ns(), std::nullopt);
+  clock.Add({0, 105, 106, 11});  // the worked number of session.proto
+  EXPECT_EQ(clock.offset_ns(), 100);
+  clock.Add({0, 500, 501, 601});  // slower: does not count
+  EXPECT_EQ(clock.offset_ns(), 100);
+  EXPECT_EQ(clock.round_trip_ns(), 10);
+}
+
+TEST(Latency, StagesSumToTheWholeAndNeedTheClock) {
+  net::FrameFacts facts;
+  facts.stages = {.captured_ns = 1000 * kMs,
+                  .received_ns = 1005 * kMs,
+                  .tracked_ns = 1009 * kMs,
+                  .encoded_ns = 1013 * kMs};
+  facts.arrived_ns = 16 * kMs;
+  EXPECT_FALSE(TimesOf(facts, 18 * kMs, 24 * kMs, std::nullopt));
+  const auto times = TimesOf(facts, 18 * kMs, 24 * kMs, 1000 * kMs);
+  ASSERT_TRUE(times);
+  EXPECT_THAT(*times, ElementsAre(5, 4, 4, 3, 2, 6, 24));
+  LatencyMeter meter;
+  meter.Add(*times);
+  EXPECT_EQ(meter.Get(Stage::kTotal)->p50, 24);
+}
+
+}  // namespace
+}  // namespace saccade::session
