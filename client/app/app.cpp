@@ -15,6 +15,7 @@ namespace saccade::app {
 namespace {
 
 constexpr Timestamp kFrameNs = 16'000'000;
+constexpr Timestamp kStateNs = 50'000'000;    // what comes without a picture waits for one so long
 constexpr Timestamp kIdleNs = 1'000'000'000;  // ages in words grow by themselves
 constexpr double kLongestWaitS = 0.5;         // a signal is noticed within this
 constexpr int kSettle = 3;
@@ -70,24 +71,28 @@ Settings App::settings() const {
 
 absl::Status App::Run() {
   Timestamp drawn_ns = 0, stepped_ns = MonotonicNow();
-  bool due = true;
+  Timestamp within_ns = 0;  // of the last drawing the next is due
   while (!window_->closing() && !cli::Interrupted()) {
-    const Timestamp next_ns = drawn_ns + (due ? kFrameNs : kIdleNs);
-    window_->Wait(std::clamp(Seconds(next_ns - MonotonicNow()), 0.0, kLongestWaitS));
+    const double rest_s = Seconds(drawn_ns + within_ns - MonotonicNow());
+    window_->Wait(std::clamp(rest_s, 0.0, kLongestWaitS));
     Timestamp now_ns = MonotonicNow();
     // Before a new picture is taken: what was done was done to what is on the screen.
     HandleInput(now_ns);
     if (window_->TakeRefresh()) busy_frames_ = kSettle;
-    due = due || busy_frames_ > 0;
-    for (std::size_t i = 0; i < tabs_.size(); ++i) due = tabs_[i].desk->Poll(now_ns) || due;
+    if (busy_frames_ > 0) within_ns = kFrameNs;
+    for (const Tab& each : tabs_) {
+      const view::Desk::News news = each.desk->Poll(now_ns);
+      if (news == view::Desk::News::kPicture) within_ns = std::min(within_ns, kFrameNs);
+      if (news == view::Desk::News::kState) within_ns = std::min(within_ns, kStateNs);
+    }
     now_ns = MonotonicNow();
-    if (now_ns - drawn_ns < (due ? kFrameNs : kIdleNs)) continue;
+    if (now_ns - drawn_ns < within_ns) continue;
     const bool moving = tab().desk->StepMap(1e-6 * static_cast<double>(now_ns - stepped_ns));
     stepped_ns = now_ns;
     if (absl::Status drawn = Draw(now_ns); !drawn.ok()) return drawn;
     drawn_ns = now_ns;
     busy_frames_ = std::max(busy_frames_ - 1, 0);
-    due = moving || busy_frames_ > 0;
+    within_ns = moving || busy_frames_ > 0 ? kFrameNs : kIdleNs;
   }
   return absl::OkStatus();
 }
@@ -140,7 +145,8 @@ absl::Status App::Draw(Timestamp now_ns) {
   if (trace_) trace_->Drawing();
   tab().view->Update();
   layout_ = view::LayOut(window_->width(), window_->height(), window_->scale(), tabs_.size() > 1,
-                         tab().view->aspect(), settings_.layout);
+                         tab().view->aspect(), settings_.layout, corner_.corner());
+  PlaceInset(now_ns);
   tab().desk->state().above.clear();
   DrawPanes({layout_.scale, window_->pixel_ratio(), window_->height()}, now_ns);
   DrawPanels(now_ns);
@@ -151,6 +157,19 @@ absl::Status App::Draw(Timestamp now_ns) {
   tabs_[drawn].desk->Shown(shown_ns);
   if (trace_) trace_->Shown(*tabs_[drawn].desk, *tabs_[drawn].view, layout_, drawn, shown_ns);
   return absl::OkStatus();
+}
+
+void App::PlaceInset(Timestamp now_ns) {
+  const view::Desk& desk = *tab().desk;
+  const decode::Picture* picture = desk.shown();
+  std::optional<Eigen::Vector2d> at;
+  if (desk.state().main == view::Pane::kMap && picture != nullptr &&
+      session::IsPlaced(picture->facts->pose)) {
+    at = desk.map_view(layout_.main).Project(picture->facts->pose->world_from_camera.translation);
+  }
+  const Eigen::Vector2d pixel = at.value_or(Eigen::Vector2d::Zero());
+  corner_.Update(layout_, at.has_value(), layout_.main.x + static_cast<float>(pixel.x()),
+                 layout_.main.y + static_cast<float>(pixel.y()), now_ns);
 }
 
 void App::DrawPanes(const view::Canvas& canvas, Timestamp now_ns) {

@@ -39,6 +39,8 @@ class App {
   void HandleInput(Timestamp now_ns);
   void HandleKey(const view::InputEvent& event, Timestamp now_ns);
   absl::Status Draw(Timestamp now_ns);
+  /// Where the wearer's camera appears in the map decides where the inset stands.
+  void PlaceInset(Timestamp now_ns);
   void DrawPanes(const view::Canvas& canvas, Timestamp now_ns);
   void DrawPanels(Timestamp now_ns);
 
@@ -48,6 +50,7 @@ class App {
   std::size_t shown_ = 0;
   std::unique_ptr<Trace> trace_;
   view::Layout layout_;
+  view::InsetCorner corner_;
   view::Pointer pointer_;
   bool help_ = false;
   int busy_frames_ = 3;  // ImGui settles some pictures after the last input

@@ -26,11 +26,11 @@ std::string Desk::title() const {
   return source.empty() ? title_ : source;
 }
 
-bool Desk::Poll(Timestamp now_ns) {
-  bool changed = session_.Poll();
+Desk::News Desk::Poll(Timestamp now_ns) {
+  bool changed = session_.Poll(), has_picture = false;
   if (std::optional<decode::Picture> picture = player_.Take()) {
     live_ = std::move(picture);
-    changed = true;
+    has_picture = true;
   }
   changed = pilot_.Check() || changed;
   changed = state_.Expire(now_ns) || changed;
@@ -39,7 +39,8 @@ bool Desk::Poll(Timestamp now_ns) {
       session().pose->map_generation != state_.still->picture.facts->pose->map_generation) {
     state_.still.reset();
   }
-  return changed;
+  if (has_picture) return News::kPicture;
+  return changed ? News::kState : News::kNone;
 }
 
 const decode::Picture* Desk::shown() const {

@@ -43,8 +43,10 @@ class Desk {
   std::string title() const;
   std::string video_problem() const { return player_.problem(); }
 
-  /// Takes what the threads have brought; true if it is to be drawn anew.
-  bool Poll(Timestamp now_ns);
+  /// What the threads have brought: nothing, something that may wait for the next picture (numbers,
+  /// the map), or a picture.
+  enum class News { kNone, kState, kPicture };
+  News Poll(Timestamp now_ns);
   /// The live picture on the screen; nothing before the first.
   const std::optional<decode::Picture>& live() const { return live_; }
   /// The one that the video pane shows: the still, or the live one.

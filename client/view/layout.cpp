@@ -5,14 +5,24 @@
 namespace saccade::view {
 namespace {
 
-constexpr float kHeader = 38, kTabs = 30, kStrip = 26, kTools = 108, kGaze = 236, kMargin = 14;
+constexpr float kHeader = 38, kTabs = 30, kStrip = 26, kTools = 128, kGaze = 236, kMargin = 14;
+constexpr float kRoom = 24;  // round the camera: its picture is drawn there
+constexpr std::int64_t kPatienceNs = 500'000'000;
 constexpr float kEdge = 6;  // half of what can be gripped
+
+Rect InsetAt(Corner corner, const Rect& main, float width, float height, float margin) {
+  const bool east = corner == Corner::kSouthEast || corner == Corner::kNorthEast;
+  const bool south = corner == Corner::kSouthEast || corner == Corner::kSouthWest;
+  return {east ? main.right() - margin - width : main.x + margin,
+          south ? main.bottom() - margin - height : main.y + margin, width, height};
+}
 
 }  // namespace
 
 Layout LayOut(float width, float height, float scale, bool tabs, float aspect,
-              const LayoutSettings& settings) {
+              const LayoutSettings& settings, Corner corner) {
   Layout out;
+  out.corner = corner;
   out.scale = scale;
   const float header = kHeader * scale, strip = kStrip * scale;
   const float tab_height = tabs ? kTabs * scale : 0;
@@ -36,9 +46,10 @@ Layout LayOut(float width, float height, float scale, bool tabs, float aspect,
     inset_height = 0.6f * body;
     inset_width = inset_height * aspect;
   }
-  out.inset = {out.main.right() - margin - inset_width, out.main.bottom() - margin - inset_height,
-               inset_width, inset_height};
-  out.inset_edge = {out.inset.x - kEdge * scale, out.inset.y, 2 * kEdge * scale, inset_height};
+  out.inset = InsetAt(corner, out.main, inset_width, inset_height, margin);
+  const bool east = corner == Corner::kSouthEast || corner == Corner::kNorthEast;
+  out.inset_edge = {(east ? out.inset.x : out.inset.right()) - kEdge * scale, out.inset.y,
+                    2 * kEdge * scale, inset_height};
   return out;
 }
 
@@ -48,8 +59,31 @@ void DragPanelEdge(const Layout& layout, float x, float width, LayoutSettings& s
 }
 
 void DragInsetEdge(const Layout& layout, float x, LayoutSettings& settings) {
-  settings.inset_share = std::clamp((layout.inset.right() - x) / layout.main.width,
-                                    LayoutSettings::kLeastInset, LayoutSettings::kMostInset);
+  const bool east = layout.inset_edge.x < layout.inset.x;
+  const float width = east ? layout.inset.right() - x : x - layout.inset.x;
+  settings.inset_share = std::clamp(width / layout.main.width, LayoutSettings::kLeastInset,
+                                    LayoutSettings::kMostInset);
+}
+
+void InsetCorner::Update(const Layout& layout, bool shown, float x, float y, std::int64_t now_ns) {
+  const float margin = kMargin * layout.scale, room = kRoom * layout.scale;
+  const auto covers = [&](Corner corner) {
+    const Rect at = InsetAt(corner, layout.main, layout.inset.width, layout.inset.height, margin);
+    return Rect{at.x - room, at.y - room, at.width + 2 * room, at.height + 2 * room}.Contains(x, y);
+  };
+  if (!shown || !covers(corner_)) {
+    covered_ns_ = 0;
+    return;
+  }
+  if (covered_ns_ == 0) covered_ns_ = now_ns;
+  if (now_ns - covered_ns_ < kPatienceNs) return;
+  for (const Corner corner :
+       {Corner::kSouthEast, Corner::kSouthWest, Corner::kNorthEast, Corner::kNorthWest}) {
+    if (covers(corner)) continue;
+    corner_ = corner;
+    break;
+  }
+  covered_ns_ = 0;
 }
 
 }  // namespace saccade::view

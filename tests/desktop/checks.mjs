@@ -1,6 +1,6 @@
 // The script of the browser's test, in a window: twenty clicks, drawn cubes, a server that goes and comes.
 import { join } from 'node:path';
-import { clicks } from './clicks.mjs';
+import { clicks, covered } from './clicks.mjs';
 import { drawnCubes, glassToGlass, shownFrames } from './pairing.mjs';
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -63,9 +63,10 @@ async function frozen({ desktop, screen, check, truth }) {
   );
   screen.press('c');
   const before = new Set(desktop.look().marks.map(({ id }) => id));
-  const object = truth.frame(still.frame)?.objects.find(({ visible, pixel }) => visible && pixel);
-  const [u, v] = object?.pixel ?? [still.width / 2, still.height / 2];
-  screen.click([still.left + (u + 0.5) * still.scale, still.top + (v + 0.5) * still.scale]);
+  const at = ([u, v]) => [still.left + (u + 0.5) * still.scale, still.top + (v + 0.5) * still.scale];
+  const free = ({ visible, pixel }) => visible && pixel && !covered(desktop.look(), at(pixel));
+  const object = truth.frame(still.frame)?.objects.find(free);
+  screen.click(at(object?.pixel ?? [40, 40]));
   const shown = await desktop.until('a mark', ({ marks }) => marks.some(({ id }) => !before.has(id)));
   check('a click in it is a pixel of that frame', shown.pressed[0] === video.frame, `frame ${shown.pressed[0]}`);
   screen.press('v', 'p');

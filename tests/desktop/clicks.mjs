@@ -109,7 +109,8 @@ const candidates = (frame, used) =>
     .filter(({ visible, pixel }) => visible && pixel)
     .sort((a, b) => (used.get(a.name) ?? 0) - (used.get(b.name) ?? 0));
 
-const covered = ({ inset: [x, y, w, h] }, [u, v]) =>
+/** True where the inset lies over the large pane there. */
+export const covered = ({ inset: [x, y, w, h] }, [u, v]) =>
   u > x - 10 && u < x + w + 10 && v > y - 10 && v < y + h + 10;
 
 async function aimInVideo({ desktop, screen, truth }, used) {

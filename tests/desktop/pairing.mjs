@@ -2,7 +2,6 @@
 import { cubePixels, length } from '../../web/test/browser/optics.mjs';
 import { CLEAR, displacement, REACH_PX } from '../../web/test/browser/outline.mjs';
 import { median, pixelsOf, psnr } from '../../web/test/browser/pictures.mjs';
-import { accuracyBar } from './clicks.mjs';
 
 const ACCENT = [0xc4, 0xb0, 0xff]; // the selected mark
 const CUBE_M = 0.05;
@@ -72,11 +71,10 @@ export async function drawnCubes(context) {
     }
   }
   context.shot('cubes');
-  const bar = accuracyBar(context).share > 0.02 ? 6 : 3;
   check(
     // What the click itself was off is in it: at an outline 4 % of the depth, 5 px seen from elsewhere.
-    `drawn cubes within ${bar} px of what was clicked (3, and 6 where the tracker is slow)`,
-    errors.length >= 5 && median(errors) < bar,
+    'drawn cubes within 3 px of what was clicked',
+    errors.length >= 5 && median(errors) < 3,
     `${errors.length} sightings, median ${median(errors)?.toFixed(2)} px, worst ${Math.max(...errors).toFixed(2)} px`,
   );
 }

@@ -2,6 +2,7 @@
 // changes between two wearers.
 import { join } from 'node:path';
 import { startServer } from '../../web/test/browser/server.mjs';
+import { covered } from './clicks.mjs';
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -32,13 +33,13 @@ export async function runWork(context) {
 function objectIn({ desktop, truth }, which = 0) {
   const { video } = desktop.look();
   const inside = ([u, v]) => u > 60 && v > 60 && u < video.width - 60 && v < video.height - 60;
+  const at = ([u, v]) => [video.left + (u + 0.5) * video.scale, video.top + (v + 0.5) * video.scale];
   const objects = (truth.frame(video.frame)?.objects ?? []).filter(
-    ({ visible, pixel }) => visible && pixel && inside(pixel),
+    ({ visible, pixel }) => visible && pixel && inside(pixel) && !covered(desktop.look(), at(pixel)),
   );
   const object = objects[which % Math.max(objects.length, 1)];
   if (!object) return undefined;
-  const [u, v] = object.pixel;
-  return [video.left + (u + 0.5) * video.scale, video.top + (v + 0.5) * video.scale];
+  return at(object.pixel);
 }
 
 async function findObject(context, which) {

@@ -44,5 +44,21 @@ TEST(Layout, EdgesThatAreDraggedStayWithinBounds) {
   EXPECT_FLOAT_EQ(settings.inset_share, LayoutSettings::kLeastInset);
 }
 
+TEST(InsetCorner, LeavesTheCameraAfterHalfASecondAndStaysWhereItIsOtherwise) {
+  constexpr std::int64_t kMs = 1'000'000;
+  InsetCorner inset;
+  Layout out = LayOut(1280, 720, 1, false, 4.0f / 3, {}, inset.corner());
+  const float x = out.inset.x + 20, y = out.inset.y + 20;
+  inset.Update(out, true, x, y, 1000 * kMs);
+  inset.Update(out, true, x, y, 1400 * kMs);
+  EXPECT_EQ(inset.corner(), Corner::kSouthEast);
+  inset.Update(out, true, x, y, 1600 * kMs);
+  EXPECT_EQ(inset.corner(), Corner::kSouthWest);
+  out = LayOut(1280, 720, 1, false, 4.0f / 3, {}, inset.corner());
+  EXPECT_FALSE(out.inset.Contains(x, y));
+  for (int i = 0; i < 20; ++i) inset.Update(out, true, x, y, (2000 + 100 * i) * kMs);
+  EXPECT_EQ(inset.corner(), Corner::kSouthWest);
+}
+
 }  // namespace
 }  // namespace saccade::view
