@@ -121,6 +121,11 @@ void App::HandleKey(const view::InputEvent& event, Timestamp now_ns) {
     help_ = false;
     return;
   }
+  // A key pressed and let go between two pictures is none to ImGui.
+  if (event.key.key == "enter" && !event.repeat && desk.state().editor) {
+    desk.state().editor->finish = desk.state().editor->opened;
+    return;
+  }
   // Letters are tools only where nobody writes.
   if ((io.WantTextInput || desk.state().editor || help_) && action != tools::Action::kEscape) {
     if (help_ && action == tools::Action::kHelp) help_ = false;

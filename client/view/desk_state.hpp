@@ -42,6 +42,7 @@ struct TextEditor {
   float x = 0, y = 0;  // in the window
   std::string text;
   bool opened = false;  // has had the keyboard
+  bool finish = false;  // Enter was pressed; what was typed before it may still be on its way
 };
 
 /// What this person is doing with one wearer. The thread that draws.

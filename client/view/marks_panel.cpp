@@ -184,19 +184,24 @@ void DrawEditor(const PanelContext& context, const Rect& within) {
   const std::size_t room =
       fits ? kMaxTextBytes - editor.text.size() : editor.text.size() - kMaxTextBytes;
   ImGui::PushStyleColor(ImGuiCol_Text, fits ? kDim : kWarn);
+  ImGui::AlignTextToFramePadding();
   ImGui::Text(fits ? "%zu bytes left" : "%zu bytes too long: shorten it", room);
   ImGui::PopStyleColor();
   ImGui::SameLine();
+  ImGui::PushStyleColor(ImGuiCol_Button, kLine);
   const bool placed = ImGui::Button(editor.id.empty() ? "Place" : "Save");
   ImGui::SameLine();
   const bool cancelled = ImGui::Button("Cancel");
+  ImGui::PopStyleColor();
   NoteAbove(desk);
   ImGui::End();
   ImGui::PopStyleColor();
   if (cancelled) {
     desk.FinishEditor(false, context.now_ns);
-  } else if ((entered || placed) && fits) {
+  } else if ((entered || placed || editor.finish) && fits) {
     desk.FinishEditor(true, context.now_ns);
+  } else {
+    editor.finish = false;
   }
 }
 

@@ -179,9 +179,11 @@ void DrawTools(const PanelContext& context, const Rect& rect) {
                      ImGuiWindowFlags_NoFocusOnAppearing);
     if (asks) {
       Colored(kWarn, "Forget the map? Marks pause until their place is known again.");
+      ImGui::PushStyleColor(ImGuiCol_Button, kLine);
       if (ImGui::Button("Forget it")) desk.ConfirmReset(true, context.now_ns);
       ImGui::SameLine(0, 8 * context.scale);
       if (ImGui::Button("Keep it")) desk.ConfirmReset(false, context.now_ns);
+      ImGui::PopStyleColor();
     } else {
       Colored(kWarn, refusal);
     }
