@@ -27,7 +27,8 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   app.set_version_flag("--version", std::string("saccade-client ") + Version());
   app.add_option("--server", servers,
                  "HOST:PORT of a server's gRPC address (127.0.0.1:50051); given again: another tab")
-      ->take_all();
+      ->take_all()
+      ->allow_extra_args(false);
   app.add_option("--name", options.name, "Your name, as the others see it; kept for the next time");
   CLI::Option* trust =
       app.add_option("--trust", options.trust,

@@ -97,7 +97,8 @@ std::string DeskView::Note(Pane pane, Timestamp now_ns) const {
                                          : ". The map has changed since: marks are not where they "
                                            "were");
   }
-  if (!desk_.live()) return told.link.live() ? "waiting for the first picture" : "";
+  if (!desk_.live())
+    return told.link.live() ? "waiting for the first picture" : "no picture: not connected";
   const Timestamp age = now_ns - desk_.live()->decoded_ns;
   if (age > kStaleNs && !told.source_ended) {
     return absl::StrCat("picture is ", tools::SpanWords(age), " old");
