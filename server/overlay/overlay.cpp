@@ -7,7 +7,7 @@
 
 #include "server/overlay/label_painter.hpp"
 #include "server/overlay/painter.hpp"
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 
 namespace saccade {
 namespace {

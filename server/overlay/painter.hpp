@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {

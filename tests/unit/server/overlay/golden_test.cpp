@@ -9,7 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 #include "tests/unit/server/anchors/synthetic_map.hpp"
 
 namespace saccade {

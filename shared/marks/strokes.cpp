@@ -1,10 +1,10 @@
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "server/overlay/ink_thinner.hpp"
+#include "shared/marks/ink_thinner.hpp"
 
 namespace saccade {
 namespace {
