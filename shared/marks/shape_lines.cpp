@@ -179,8 +179,11 @@ std::string LabelWords(const Annotation& annotation, bool metric) {
       return text.empty() ? "note" : text;
     case AnnotationShape::kPin:
       return before(std::to_string(annotation.number));
-    case AnnotationShape::kMeasure:
-      return before(MeasureText(annotation.length_m, annotation.length_sigma_m, metric));
+    case AnnotationShape::kMeasure: {
+      const std::string length =
+          MeasureText(annotation.length_m, annotation.length_sigma_m, metric);
+      return text.empty() ? length : text + ": " + length;
+    }
     case AnnotationShape::kCheckList:
       return ItemLines(annotation);
     default:
