@@ -91,7 +91,11 @@ class Connection {
   /// Page by page until there are no more.
   absl::StatusOr<std::vector<Annotation>> ListAnnotations();
   absl::Status DeleteAnnotation(const std::string& id);
-  /// What was undone or redone, in words. Acts on this session's own last change.
+  /// Ticks line `index` (from 0) of a check list off, or on again.
+  absl::StatusOr<Annotation> TickCheckItem(const std::string& id, std::uint32_t index, bool done);
+  /// The file that a picture was made of.
+  absl::StatusOr<Picture> GetPicture(const std::string& id);
+  /// What was undone or redone, in words. Acts on the person's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();
 
