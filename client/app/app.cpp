@@ -9,6 +9,7 @@
 #include "client/app/entrance.hpp"
 #include "client/app/snapshot.hpp"
 #include "client/cli/interrupt.hpp"
+#include "client/cli/session_file.hpp"
 #include "client/view/panels.hpp"
 
 namespace saccade::app {
@@ -42,7 +43,7 @@ absl::Status App::AddTab(const Options& options, const Address& address) {
   session::SessionOptions session;
   session.connection.server = address.server;
   session.connection.display_name = settings_.name;
-  session.connection.person_key = PersonKey();
+  session.connection.person_key = cli::PersonKey(address.server, settings_.name);
   session.enter = MakeEntrance(options, address);
   Tab tab;
   tab.desk = std::make_unique<view::Desk>(std::move(session), address.server, &view::Window::Wake);

@@ -7,16 +7,12 @@
 #include <cstdlib>
 #include <system_error>
 
-#include "client/net/connection.hpp"
 #include "shared/io/private_file.hpp"
-#include "shared/io/regular_file.hpp"
 #include "shared/io/toml_table.hpp"
 
 namespace saccade::app {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr std::size_t kKeyBytes = 64;
 
 fs::path Folder(const char* variable, const char* under_home) {
   if (const char* folder = std::getenv(variable); folder != nullptr && *folder != 0) {
@@ -98,17 +94,6 @@ absl::Status SaveSettings(const fs::path& file, const Settings& settings) {
   if (Write(file, text)) return absl::OkStatus();
   return absl::UnavailableError(
       absl::StrCat("cannot keep the settings in ", file.string(), ": make that folder writable"));
-}
-
-std::string PersonKey() {
-  const fs::path folder = Folder("XDG_STATE_HOME", ".local/state");
-  if (folder.empty()) return "";
-  const fs::path file = folder / "person";
-  const absl::StatusOr<std::string> kept = ReadRegularFile(file, kKeyBytes, "a person's key");
-  if (kept.ok() && kept->size() == kKeyBytes) return *kept;
-  const std::string key =
-      absl::StrReplaceAll(absl::StrCat(net::RandomUuid(), net::RandomUuid()), {{"-", ""}});
-  return Write(file, key) ? key : "";
 }
 
 }  // namespace saccade::app

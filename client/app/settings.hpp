@@ -30,8 +30,4 @@ absl::Status LoadSettings(const std::filesystem::path& file, Settings& settings)
 /// remedy.
 absl::Status SaveSettings(const std::filesystem::path& file, const Settings& settings);
 
-/// The secret that stands for this person, made at the first call, kept in
-/// $XDG_STATE_HOME/saccade/person (0600). Empty: it cannot be kept.
-std::string PersonKey();
-
 }  // namespace saccade::app

@@ -91,6 +91,7 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
                {"offset_ns", told.clock.offset_ns().value_or(0)},
                {"tool", tools::ControlOf(state.tool).label},
                {"selected", state.selected_id},
+               {"lasers", told.lasers.size()},
                {"editing", state.editor.has_value()},
                {"refused",
                 {{"map", state.Refusal("map")},

@@ -16,6 +16,7 @@
 #include "saccade/v1/annotation.grpc.pb.h"
 #include "saccade/v1/gaze.grpc.pb.h"
 #include "saccade/v1/map.grpc.pb.h"
+#include "saccade/v1/pointer.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/gaze.hpp"
@@ -60,7 +61,8 @@ class Connection::Impl {
         session_(v1::SessionService::NewStub(channel_)),
         map_(v1::MapService::NewStub(channel_)),
         annotation_(v1::AnnotationService::NewStub(channel_)),
-        gaze_(v1::GazeService::NewStub(channel_)) {}
+        gaze_(v1::GazeService::NewStub(channel_)),
+        pointer_(v1::PointerService::NewStub(channel_)) {}
 
   // One unary call with this connection's deadline.
   template <typename Stub, typename Request, typename Response>
@@ -178,6 +180,7 @@ class Connection::Impl {
   const std::unique_ptr<v1::MapService::Stub> map_;
   const std::unique_ptr<v1::AnnotationService::Stub> annotation_;
   const std::unique_ptr<v1::GazeService::Stub> gaze_;
+  const std::unique_ptr<v1::PointerService::Stub> pointer_;
 };
 
 Connection::Connection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -329,6 +332,18 @@ absl::StatusOr<std::string> Connection::Redo() {
                                        v1::RedoAnnotationRequest());
   if (!response.ok()) return response.status();
   return response->description();
+}
+
+absl::Status Connection::Point(const LaserWord& word) {
+  v1::PointRequest request;
+  request.set_kind(v1::POINTER_KIND_LASER);
+  request.set_stroke_id(word.stroke_id);
+  *request.add_points() = wire::ToProto(word.target);
+  request.set_released(word.released);
+  request.set_color_rgba(word.color_rgba);
+  return impl_
+      ->CallInSession(*impl_->pointer_, &v1::PointerService::Stub::Point, std::move(request))
+      .status();
 }
 
 absl::StatusOr<GazeSnapshot> Connection::GetGaze() {

@@ -99,6 +99,9 @@ class Connection {
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();
 
+  /// Shows the others where one points; never stored.
+  absl::Status Point(const LaserWord& word);
+
   GazeAnswer GetGaze();
   /// Asks for the lease, or renews it: at least every 200 ms, or it is gone.
   absl::StatusOr<Lease> AcquireLease(const std::string& lease_id);

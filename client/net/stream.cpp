@@ -35,6 +35,30 @@ absl::StatusOr<MapChange> FromProto(const v1::MapDelta& message) {
   return change;
 }
 
+absl::StatusOr<std::vector<LaserPoint>> FromProto(const v1::PointerEvent& message) {
+  std::vector<LaserPoint> points;
+  for (int i = 0; i < message.pointers_size(); ++i) {
+    const v1::Pointer& pointer = message.pointers(i);
+    if (pointer.kind() != v1::POINTER_KIND_LASER) continue;
+    LaserPoint point{.participant_id = pointer.participant_id(),
+                     .display_name = pointer.display_name(),
+                     .stroke_id = pointer.stroke_id(),
+                     .color_rgba = pointer.color_rgba(),
+                     .released = pointer.released()};
+    if (pointer.points_in_world_m_size() > 0) {
+      const auto& newest = pointer.points_in_world_m(pointer.points_in_world_m_size() - 1);
+      absl::StatusOr<Eigen::Vector3d> at =
+          wire::FromProto(newest, absl::StrCat("pointer.pointers[", i, "].points_in_world_m"));
+      if (!at.ok()) return at.status();
+      point.point_in_world = *at;
+    } else if (!point.released) {
+      continue;
+    }
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
 }  // namespace
 
 class Stream::Impl {
@@ -54,7 +78,7 @@ class Stream::Impl {
     request.set_video_view(v1::VIDEO_VIEW_RAW);
     for (const v1::Topic topic :
          {v1::TOPIC_POSE, v1::TOPIC_MAP, v1::TOPIC_VIDEO, v1::TOPIC_ANNOTATION, v1::TOPIC_GAZE,
-          v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS}) {
+          v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS, v1::TOPIC_POINTER}) {
       request.add_topics(topic);
     }
     const auto reader = stub_->Subscribe(&context_, request);
@@ -108,6 +132,8 @@ class Stream::Impl {
       }
       case v1::Event::kGaze:
         return Wrap(wire::FromProto(message.gaze(), "gaze"));
+      case v1::Event::kPointer:
+        return Wrap(FromProto(message.pointer()));
       case v1::Event::kStatistics:
         return std::optional<StreamEvent>(net::FromProto(message.statistics()));
       case v1::Event::kPresence:

@@ -56,8 +56,18 @@ struct MapChange {
   std::vector<FeatureId> removed_ids;
 };
 
-using StreamEvent = std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange,
-                                 GazeSnapshot, Statistics, std::vector<Participant>, SourceEnd>;
+/// Where somebody points right now; the newest point of it.
+struct LaserPoint {
+  std::string participant_id, display_name, stroke_id;
+  std::uint32_t color_rgba = 0xffffffff;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
+  bool released = false;
+  Timestamp heard_ns = 0;  // this machine's clock
+};
+
+using StreamEvent =
+    std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange, GazeSnapshot, Statistics,
+                 std::vector<Participant>, std::vector<LaserPoint>, SourceEnd>;
 
 /// Times of one Ping [ns]: `sent` and `answered` on this machine's clock, the others on the
 /// server's.

@@ -96,6 +96,14 @@ struct SourceEnd {
   std::uint64_t frames = 0;
 };
 
+/// A laser pointer as it is sent: a point now, or its end.
+struct LaserWord {
+  std::string stroke_id;  // UUID of ours
+  AnnotationTarget target;
+  bool released = false;
+  std::uint32_t color_rgba = 0xffffffff;
+};
+
 /// What Watch() delivers.
 using WatchEvent =
     std::variant<MapSnapshot, AnnotationChange, Statistics, std::vector<Participant>, SourceEnd>;

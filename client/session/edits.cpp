@@ -91,6 +91,16 @@ void Edits::ResetMap(Done done) {
       done);
 }
 
+void Edits::Point(net::LaserWord word, Done done) {
+  Ask(
+      [word = std::move(word), done](net::Connection& connection) -> Session::Answer {
+        return [told = connection.Point(word), done](State& /*state*/) {
+          done(told.ok() ? absl::StatusOr<std::string>("") : told);
+        };
+      },
+      done);
+}
+
 void Edits::FetchStill(FrameId frame_id, net::VideoView view,
                        std::function<void(const absl::StatusOr<net::Still>&)> done) {
   const absl::Status asked =

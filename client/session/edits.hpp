@@ -32,6 +32,7 @@ class Edits {
   void Undo(Done done);
   void Redo(Done done);
   void ResetMap(Done done);
+  void Point(net::LaserWord word, Done done);
   /// A still of a frame of the last 10 s.
   void FetchStill(FrameId frame_id, net::VideoView view,
                   std::function<void(const absl::StatusOr<net::Still>&)> done);

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kPathSpacingM = 0.005;
 constexpr std::size_t kMaxPath = 4000;
+constexpr Timestamp kLaserNs = 1'000'000'000;
 
 }  // namespace
 
@@ -40,6 +41,13 @@ void State::Apply(const net::StreamEvent& event, Timestamp now_ns) {
           statistics = value;
         } else if constexpr (std::is_same_v<T, std::vector<net::Participant>>) {
           participants = value;
+        } else if constexpr (std::is_same_v<T, std::vector<net::LaserPoint>>) {
+          for (const net::LaserPoint& point : value) {
+            lasers.erase(point.stroke_id);
+            if (point.released || point.participant_id == joined.participant_id) continue;
+            lasers[point.stroke_id] = point;
+            lasers[point.stroke_id].heard_ns = now_ns;
+          }
         } else if constexpr (std::is_same_v<T, net::SourceEnd>) {
           source_ended = true;
         }
@@ -66,6 +74,12 @@ void State::Take(const net::MapChange& change) {
   for (const FeatureSnapshot& feature : change.upserted) features[feature.id] = feature;
   for (const FeatureId id : change.removed_ids) features.erase(id);
   ++map_version;
+}
+
+bool State::Expire(Timestamp now_ns) {
+  return std::erase_if(lasers, [now_ns](const auto& entry) {
+           return now_ns - entry.second.heard_ns > kLaserNs;
+         }) > 0;
 }
 
 std::optional<Timestamp> State::Age(Timestamp now_ns) const {

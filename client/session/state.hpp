@@ -45,6 +45,8 @@ class State {
   std::vector<net::Participant> participants;
   std::optional<net::Statistics> statistics;
   std::optional<GazeSnapshot> gaze;
+  /// Who points where now, by stroke; their own are not among them.
+  std::map<std::string, net::LaserPoint> lasers;
   AnnotationBook annotations;
   ClockOffset clock;
   // The map; `map_version` rises with every change of it.
@@ -55,6 +57,8 @@ class State {
   std::uint64_t path_version = 0;
 
   bool metric() const { return pose && pose->metric; }
+  /// Forgets lasers that nothing was heard of for a second; true if there were any.
+  bool Expire(Timestamp now_ns);
   /// How old everything shown is [ns]; nothing while it is live, and before the first of it.
   std::optional<Timestamp> Age(Timestamp now_ns) const;
 

@@ -12,14 +12,21 @@ using enum Group;
 constexpr auto kControls = std::to_array<Control>({
     {kSelect, kTool, "Select", "v", "V",
      "click a mark to select it; drag a selected one to move it"},
+    {kLaser, kTool, "Laser pointer", "w", "W",
+     "press and move: the others see where you point, until you let go"},
     {kInk, kTool, "Ink", "i", "I", "press and draw a stroke in the video"},
     {kCube, kTool, "Cube", "c", "C", "click to place a cube, 5 cm where the scale is known"},
+    {kBox, kTool, "Box", "b", "B", "click to place a box, 10 cm where the scale is known"},
     {kNote, kTool, "Note", "n", "N", "click to place a note, then type"},
     {kArrow, kTool, "Arrow", "a", "A", "click to place an arrow"},
+    {kPin, kTool, "Pin", "1", "1", "click to place a pin: the next number is its own"},
+    {kMeasure, kTool, "Distance", "d", "D", "click both ends: the length, and how sure it is"},
     {kGaze, kTool, "Look", "g", "G", "click what the camera should look at and hold"},
     {kUndo, kCommand, "Undo", "z", "Z", "take back your last change"},
     {kRedo, kCommand, "Redo", "y", "Y", "do it again"},
     {kDelete, kCommand, "Delete", "delete", "Del", "delete the selected mark"},
+    {kLock, kCommand, "Lock", "3", "3",
+     "only you and the wearer change a locked mark; again: unlock"},
     {kFreeze, kCommand, "Freeze", "p", "P", "hold the picture and click in it; again: go on"},
     {kSwap, kCommand, "Swap", "s", "S", "swap the map and the video"},
     {kFollow, kCommand, "Follow", "f", "F", "keep the wearer in view"},
@@ -71,6 +78,12 @@ std::optional<AnnotationShape> ShapeOf(Action tool) {
       return AnnotationShape::kInk;
     case kCube:
       return AnnotationShape::kCube;
+    case kBox:
+      return AnnotationShape::kBox;
+    case kPin:
+      return AnnotationShape::kPin;
+    case kMeasure:
+      return AnnotationShape::kMeasure;
     case kNote:
       return AnnotationShape::kNote;
     case kArrow:

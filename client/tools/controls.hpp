@@ -12,15 +12,20 @@ namespace saccade::tools {
 enum class Action {
   // What a click in the video or the map does.
   kSelect,
+  kLaser,
   kInk,
   kCube,
+  kBox,
   kNote,
   kArrow,
+  kPin,
+  kMeasure,
   kGaze,
   // What happens at once.
   kUndo,
   kRedo,
   kDelete,
+  kLock,
   kFreeze,
   kSwap,
   kFollow,

@@ -57,17 +57,7 @@ bool Passes(const Annotation& annotation, const MarkFilter& filter, const std::s
 }
 
 const char* ShapeWord(AnnotationShape shape) {
-  switch (shape) {
-    case AnnotationShape::kCube:
-      return "cube";
-    case AnnotationShape::kNote:
-      return "note";
-    case AnnotationShape::kArrow:
-      return "arrow";
-    case AnnotationShape::kInk:
-      return "stroke";
-  }
-  return "mark";
+  return shape == AnnotationShape::kInk ? "stroke" : ToString(shape);
 }
 
 void InkLine::Begin(FrameId frame_id, const Eigen::Vector2d& pixel) {

@@ -34,7 +34,7 @@ struct MarkFilter {
 /// case; `me`: the name whose marks are mine.
 bool Passes(const Annotation& annotation, const MarkFilter& filter, const std::string& me);
 
-/// "cube", "note", "arrow", "stroke".
+/// "cube", "note", "stroke", "check list".
 const char* ShapeWord(AnnotationShape shape);
 
 /// A stroke while it is drawn, in the picture of one frame: points nearer than 2 px to the last one

@@ -34,6 +34,7 @@ Desk::News Desk::Poll(Timestamp now_ns) {
   }
   changed = pilot_.Check() || changed;
   changed = state_.Expire(now_ns) || changed;
+  changed = session().Expire(now_ns) || changed;
   // A still of a map that is gone shows marks where they are not.
   if (state_.still && state_.still->picture.facts->pose && session().pose &&
       session().pose->map_generation != state_.still->picture.facts->pose->map_generation) {
@@ -158,6 +159,8 @@ void Desk::Snapshot(Timestamp now_ns) {
 void Desk::Escape() {
   if (state_.editor) {
     state_.editor.reset();
+  } else if (state_.measure_from) {
+    state_.measure_from.reset();
   } else if (state_.ink.drawing()) {
     state_.ink.Cancel();
   } else if (moving_) {
@@ -182,6 +185,7 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
     const std::string why = action == kGaze ? WhyNoHead() : "";
     if (!why.empty()) return state_.Refuse(control.label, why, now_ns);
     state_.tool = action;
+    state_.measure_from.reset();
     return;
   }
   if (control.group == tools::Group::kHead) return RunHead(action, now_ns);
@@ -193,6 +197,8 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
     case kDelete:
       if (!state_.selected_id.empty()) return Remove(state_.selected_id, now_ns);
       return state_.Refuse(control.label, "Select a mark first.", now_ns);
+    case kLock:
+      return Lock(now_ns);
     case kFreeze:
       return Freeze(now_ns);
     case kSwap:

@@ -66,7 +66,7 @@ class Desk {
   /// `where`: of the pointer, in the window.
   void Run(tools::Action action, Timestamp now_ns);
   void Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px);
-  void Drag(Pane pane, const Eigen::Vector2d& pixel);
+  void Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view);
   /// `moved`: the pointer was dragged; `x`, `y`: in the window.
   void Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, bool moved,
                float x, float y, Timestamp now_ns);
@@ -84,7 +84,8 @@ class Desk {
   void ConfirmReset(bool really, Timestamp now_ns);
   /// Which frame's picture was last pressed, and where; for tests.
   const std::optional<PixelTarget>& pressed() const { return pressed_pixel_; }
-  bool dragging_mark() const { return moving_.has_value(); }
+  /// A drag is of a mark or the laser pointer: it does not turn the map.
+  bool dragging_mark() const { return moving_.has_value() || !laser_id_.empty(); }
   /// Where the mark that is dragged would be put [m].
   const std::optional<Eigen::Vector3d>& dragged_to() const { return dragged_to_; }
   /// Keeps a picture with its marks as a file, and says where; set by whoever knows where.
@@ -95,6 +96,7 @@ class Desk {
                                           const tools::View* view) const;
   std::string WhyNoLanding(Pane pane) const;
   std::vector<Annotation> Drawn() const;
+  void Lock(Timestamp now_ns);
   void Freeze(Timestamp now_ns);
   void Snapshot(Timestamp now_ns);
   void Escape();
@@ -133,6 +135,9 @@ class Desk {
   };
   std::optional<Pressed> pressed_;
   std::optional<PixelTarget> pressed_pixel_;
+  std::string laser_id_;  // of the point that is shown to others; empty: none
+  Timestamp pointed_ns_ = 0;
+  void PointAt(const AnnotationTarget& target, bool released);
   std::optional<std::string> moving_;  // id of the mark that is dragged
   std::optional<Eigen::Vector3d> dragged_to_;
 };

@@ -10,6 +10,9 @@
 namespace saccade::view {
 namespace {
 
+constexpr double kBoxM = 0.1;
+constexpr Timestamp kPointNs = 25'000'000;  // between two words of a laser pointer
+
 const char* NameOf(Pane pane) { return pane == Pane::kMap ? "map" : "video"; }
 
 template <typename T, typename Value>
@@ -94,8 +97,17 @@ void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* vie
   if (state_.tool == tools::Action::kSelect && selected) moving_ = pressed_->picked_id;
 }
 
-void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel) {
+void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view) {
   if (state_.ink.drawing() && pane == Pane::kVideo) state_.ink.Add(pixel);
+  if (laser_id_.empty() || MonotonicNow() - pointed_ns_ < kPointNs) return;
+  if (const auto landing = LandingAt(pane, pixel, view)) PointAt(landing->target, false);
+}
+
+/// Never stored; without a word for a second it is gone by itself.
+void Desk::PointAt(const AnnotationTarget& target, bool released) {
+  pointed_ns_ = MonotonicNow();
+  edits_.Point({laser_id_, target, released, state_.color_rgba}, Tell("Laser pointer"));
+  if (released) laser_id_.clear();
 }
 
 void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, bool moved,
@@ -103,6 +115,11 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
   if (!pressed_) return;
   const Pressed pressed = *std::exchange(pressed_, std::nullopt);
   const Where where = NameOf(pane);
+  if (!laser_id_.empty()) {
+    const std::optional<tools::Landing> landing = LandingAt(pane, pixel, view);
+    return PointAt(landing ? landing->target : pressed.landing->target, true);
+  }
+  if (state_.tool == tools::Action::kLaser) return;
   if (state_.ink.drawing()) {
     std::vector<Eigen::Vector2d> ink = state_.ink.Finish();
     if (ink.empty()) return state_.Refuse(where, "Not placed: press and draw a stroke.", now_ns);
@@ -145,7 +162,18 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
     state_.editor = TextEditor{pressed.landing, "", pane, x, y, "", false};
     return;
   }
+  if (*shape == AnnotationShape::kMeasure && !state_.measure_from) {
+    state_.measure_from = pressed.landing;
+    return;
+  }
   Place(*shape, *pressed.landing, "", {}, where);
+}
+
+void Desk::Lock(Timestamp now_ns) {
+  const Annotation* mark = session().annotations.Find(state_.selected_id);
+  if (mark == nullptr) return state_.Refuse("Lock", "Select a mark first.", now_ns);
+  edits_.Update(PatchOf(mark->id, &AnnotationPatch::locked, !mark->locked),
+                Tell(absl::StrCat("annotation ", mark->id)));
 }
 
 void Desk::Place(AnnotationShape shape, const tools::Landing& landing, const std::string& text,
@@ -156,7 +184,15 @@ void Desk::Place(AnnotationShape shape, const tools::Landing& landing, const std
   placement.draft.color_rgba = state_.color_rgba;
   placement.draft.target = landing.target;
   placement.draft.ink_px = std::move(ink);
-  if (shape != AnnotationShape::kInk) {
+  if (shape == AnnotationShape::kBox) {
+    placement.draft.extent_m = Eigen::Vector3d::Constant(kBoxM);
+    placement.draft.size_m = kBoxM;
+  }
+  if (shape == AnnotationShape::kMeasure) {
+    const tools::Landing from = *std::exchange(state_.measure_from, std::nullopt);
+    placement.draft.target = from.target;
+    placement.draft.end_target = landing.target;
+  } else if (shape != AnnotationShape::kInk) {
     placement.later = landing.later;
     placement.guess_in_world = landing.point_in_world;
   }

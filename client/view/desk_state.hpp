@@ -64,6 +64,7 @@ class DeskState {
   std::optional<TextEditor> editor;
   std::vector<Rect> above;  // what lies over the panes, of the picture on the screen
   tools::InkLine ink;
+  std::optional<tools::Landing> measure_from;  // one end of a distance, until the other is clicked
   /// What the camera was asked to look at, until the server says that it does.
   std::optional<Eigen::Vector3d> asked_in_world;
 

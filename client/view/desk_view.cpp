@@ -125,7 +125,8 @@ Marks DeskView::MarksIn(const tools::View& view) const {
     pending.push_back(guess.id);
     drawn.push_back(std::move(guess));
   }
-  Marks marks = AnnotationMarks(*view.camera, view.world_from_camera, drawn);
+  Marks marks =
+      AnnotationMarks(*view.camera, view.world_from_camera, drawn, desk_.session().metric());
   // Not answered is not the same as not to be trusted.
   for (Label& label : marks.labels) {
     if (std::find(pending.begin(), pending.end(), label.annotation_id) != pending.end()) {
@@ -212,12 +213,22 @@ void DeskView::DrawFeatures(const net::FrameFacts& facts, const tools::View& vie
 }
 
 void DeskView::DrawLanding(Pane pane, const tools::View& view, Painter& painter) const {
+  for (const auto& [id, laser] : desk_.session().lasers) {
+    if (const auto at = view.Project(laser.point_in_world)) {
+      painter.Laser(*at, ColorOf(laser.color_rgba), laser.display_name);
+    }
+  }
+  const auto& from = desk_.state().measure_from;
+  const std::optional<Eigen::Vector2d> start =
+      from ? view.Project(from->point_in_world) : std::nullopt;
+  if (start) painter.Ring(*start, 0, "from here");
   const std::optional<Hover>& hover = desk_.state().hover;
   if (!hover || !hover->landing) return;
   const tools::Landing& landing = *hover->landing;
   std::optional<Eigen::Vector2d> at = hover->pixel;
   if (pane != hover->pane) at = view.Project(landing.point_in_world);
   if (!at) return;
+  if (start) painter.Line({*start, *at}, kAccent, true);
   std::optional<double> radius;
   if (landing.sigma_m && view.Depth(landing.point_in_world) > 0) {
     radius = *landing.sigma_m / view.Depth(landing.point_in_world) / view.camera->RadiansPerPixel();

@@ -9,6 +9,7 @@
 
 #include "client/tools/words.hpp"
 #include "client/view/panels.hpp"
+#include "shared/marks/shape_lines.hpp"
 
 namespace saccade::view {
 namespace {
@@ -100,8 +101,10 @@ void DrawRow(const PanelContext& context, const Annotation& annotation, const to
   }
   list->AddCircleFilled({at.x + 11 * context.scale, at.y + pad + 0.5f * line}, 4 * context.scale,
                         ColorOf(annotation.color_rgba));
-  const std::string title =
-      annotation.text.empty() ? tools::ShapeWord(annotation.shape) : annotation.text;
+  std::string title = LabelWords(annotation, scale.metric);
+  title = title.substr(0, title.find('\n'));
+  if (annotation.text.empty() && title.empty()) title = tools::ShapeWord(annotation.shape);
+  if (annotation.locked) title += " (locked)";
   const std::string by =
       annotation.anchor.state == AnchorState::kProvisional ? "provisional" : annotation.author;
   list->PushClipRect(at, {at.x + width - buttons, at.y + size.y}, true);

@@ -65,6 +65,15 @@ void Painter::Dashes(const std::vector<ImVec2>& points, ImU32 color, float width
   }
 }
 
+void Painter::Laser(const Eigen::Vector2d& pixel, ImU32 color, const std::string& name) {
+  const ImVec2 at = At(pixel);
+  const float size = unit_ * thinning();
+  list_->AddCircleFilled(at, 7 * size, kHalo);
+  list_->AddCircleFilled(at, 4 * size, color);
+  list_->AddCircleFilled(at, 1.5f * size, kWhite);
+  Words({at.x + 11 * size, at.y}, name, color);
+}
+
 void Painter::Line(const Polyline2& line, ImU32 color, bool dashed) {
   std::vector<ImVec2> points;
   for (const Eigen::Vector2d& pixel : line) points.push_back(At(pixel));

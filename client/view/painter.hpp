@@ -35,6 +35,8 @@ class Painter {
   void Axes(const std::array<AxisStroke, 3>& axes);
   /// Where a click lands: a ring as large as its uncertainty [px of the view].
   void Ring(const Eigen::Vector2d& at, std::optional<double> radius_px, const std::string& words);
+  /// Where somebody points: a disc over a halo, the name beside it.
+  void Laser(const Eigen::Vector2d& at, ImU32 color, const std::string& name);
   void Line(const Polyline2& line, ImU32 color, bool dashed = false);
   void Words(ImVec2 at, const std::string& words, ImU32 color);
 

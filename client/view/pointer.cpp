@@ -132,7 +132,7 @@ void Pointer::Move(const InputEvent& event, const Layout& layout, Desk& desk, co
         return;
       }
       const Place place = PlaceAt(event.x, event.y, target_, desk, view, layout.scale);
-      return desk.Drag(target_.pane, place.pixel);
+      return desk.Drag(target_.pane, place.pixel, place.view ? &*place.view : nullptr);
     }
     case What::kNothing:
       break;

@@ -13,9 +13,24 @@ export async function runDesktop(context) {
   const begin = performance.now();
   context.desktop = await context.startDesktop();
   const { desktop } = context;
-  check('first picture', performance.now() - begin < 8000, `${(performance.now() - begin).toFixed(0)} ms after the start`);
+  check(
+    'first picture',
+    performance.now() - begin < 8000,
+    `${(performance.now() - begin).toFixed(0)} ms after the start`,
+  );
   const id = screen.input.bind(screen);
-  id('search', '--sync', '--class', 'saccade-client', 'windowmove', '0', '0', 'windowsize', width, height);
+  id(
+    'search',
+    '--sync',
+    '--class',
+    'saccade-client',
+    'windowmove',
+    '0',
+    '0',
+    'windowsize',
+    width,
+    height,
+  );
   await desktop.until('tracking', ({ status }) => status.startsWith('tracking'), 90_000);
   await sleep(1500);
   context.shot('first');
@@ -63,12 +78,21 @@ async function frozen({ desktop, screen, check, truth }) {
   );
   screen.press('c');
   const before = new Set(desktop.look().marks.map(({ id }) => id));
-  const at = ([u, v]) => [still.left + (u + 0.5) * still.scale, still.top + (v + 0.5) * still.scale];
+  const at = ([u, v]) => [
+    still.left + (u + 0.5) * still.scale,
+    still.top + (v + 0.5) * still.scale,
+  ];
   const free = ({ visible, pixel }) => visible && pixel && !covered(desktop.look(), at(pixel));
   const object = truth.frame(still.frame)?.objects.find(free);
   screen.click(at(object?.pixel ?? [40, 40]));
-  const shown = await desktop.until('a mark', ({ marks }) => marks.some(({ id }) => !before.has(id)));
-  check('a click in it is a pixel of that frame', shown.pressed[0] === video.frame, `frame ${shown.pressed[0]}`);
+  const shown = await desktop.until('a mark', ({ marks }) =>
+    marks.some(({ id }) => !before.has(id)),
+  );
+  check(
+    'a click in it is a pixel of that frame',
+    shown.pressed[0] === video.frame,
+    `frame ${shown.pressed[0]}`,
+  );
   screen.press('v', 'p');
   await desktop.until('live again', (now) => now.video && !now.video.frozen);
 }

@@ -57,7 +57,8 @@ export class Desktop {
   }
 
   #read() {
-    if (this.code !== undefined) throw new Error(`saccade-client ended with ${this.code}: ${this.errors}`);
+    if (this.code !== undefined)
+      throw new Error(`saccade-client ended with ${this.code}: ${this.errors}`);
     for (;;) {
       const size = readSync(this.file, this.#chunk, 0, this.#chunk.length, null);
       if (size === 0) return;

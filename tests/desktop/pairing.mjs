@@ -2,6 +2,7 @@
 import { cubePixels, length } from '../../web/test/browser/optics.mjs';
 import { CLEAR, displacement, REACH_PX } from '../../web/test/browser/outline.mjs';
 import { median, pixelsOf, psnr } from '../../web/test/browser/pictures.mjs';
+import { covered } from './clicks.mjs';
 
 const ACCENT = [0xc4, 0xb0, 0xff]; // the selected mark
 const CUBE_M = 0.05;
@@ -103,10 +104,11 @@ function cubeError({ truth }, { picture, shown }, { point }) {
   const frame = truth.frame(id);
   if (!frame) return undefined;
   const wanted = cubePixels(camera, frame.world_from_camera, point, CUBE_M, 8);
-  if (wanted.length === 0) return undefined;
+  const under = ([u, v]) => covered(shown, [left + (u + 0.5) * scale, top + (v + 0.5) * scale]);
+  if (wanted.length === 0 || wanted.some(under)) return undefined; // the inset lies over it
   const found = pixelsOf(picture, ACCENT, 40)
     .map(([x, y]) => [(x + 0.5 - left) / scale - 0.5, (y + 0.5 - top) / scale - 0.5])
-    .filter(([u, v]) => u > -0.5 && v > -0.5 && u < width && v < height);
+    .filter(([u, v]) => u > -0.5 && v > -0.5 && u < width && v < height && !under([u, v]));
   const moved = displacement(wanted, found);
   if (moved) return length(moved);
   // A cube is drawn, but not there: that counts, too. Less of it: hidden, or out of view.

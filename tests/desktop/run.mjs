@@ -36,7 +36,10 @@ for (const [path, remedy] of Object.entries(needed)) {
   console.log(`skipped: no ${path}; ${remedy}`);
   process.exit(77);
 }
-for (const [program, pack] of [['Xvfb', 'xvfb'], ['xdotool', 'xdotool']]) {
+for (const [program, pack] of [
+  ['Xvfb', 'xvfb'],
+  ['xdotool', 'xdotool'],
+]) {
   if (spawnSync('which', [program]).status === 0) continue;
   console.log(`skipped: no ${program}; install ${pack}`);
   process.exit(77);
@@ -69,10 +72,14 @@ const start = (more = []) =>
     ...['--data-dir', join(folder, 'data'), ...more],
   ]);
 const ask = (...words) => {
-  const { stdout, stderr, status } = spawnSync(options.cli, ['--server', grpc, '--plain', '--json', ...words], {
-    env: { ...process.env, HOME: folder, XDG_STATE_HOME: join(folder, 'cli') },
-    maxBuffer: 1 << 26,
-  });
+  const { stdout, stderr, status } = spawnSync(
+    options.cli,
+    ['--server', grpc, '--plain', '--json', ...words],
+    {
+      env: { ...process.env, HOME: folder, XDG_STATE_HOME: join(folder, 'cli') },
+      maxBuffer: 1 << 26,
+    },
+  );
   if (status !== 0) throw new Error(`saccade ${words.join(' ')}: ${stderr}`);
   return JSON.parse(stdout);
 };
@@ -94,7 +101,12 @@ context.isPrivate = (file) => existsSync(file) && (statSync(file).mode & 0o777) 
 context.startDesktop = async (args = []) => {
   const home = join(folder, 'home');
   mkdirSync(home, { recursive: true });
-  return Desktop.start(options.client, ['--server', grpc, '--plain', ...args], context.screen, home);
+  return Desktop.start(
+    options.client,
+    ['--server', grpc, '--plain', ...args],
+    context.screen,
+    home,
+  );
 };
 let failures = 1;
 try {

@@ -8,7 +8,17 @@ export class Screen {
   static async start(folder, width, height) {
     const child = spawn(
       'Xvfb',
-      ['-displayfd', '3', '-screen', '0', `${width}x${height}x24`, '-fbdir', folder, '-nolisten', 'tcp'],
+      [
+        '-displayfd',
+        '3',
+        '-screen',
+        '0',
+        `${width}x${height}x24`,
+        '-fbdir',
+        folder,
+        '-nolisten',
+        'tcp',
+      ],
       { stdio: ['ignore', 'ignore', 'ignore', 'pipe'] },
     );
     const number = await new Promise((resolve, reject) => {

@@ -1,8 +1,12 @@
 // What a person does in the window beside clicking cubes: writes a note, draws ink, undoes, turns the head,
 // changes between two wearers.
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { startServer } from '../../web/test/browser/server.mjs';
 import { covered } from './clicks.mjs';
+import { Desktop } from './desktop.mjs';
+import { Screen } from './screen.mjs';
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -10,7 +14,14 @@ export async function runWork(context) {
   context.server = await context.start(['--mount', 'sim']);
   context.truth = context.openTruth();
   const other = await startServer(context.options.server, [
-    ...['--source', 'sim:desk?motion=still&seed=7', '--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
+    ...[
+      '--source',
+      'sim:desk?motion=still&seed=7',
+      '--grpc',
+      '127.0.0.1:0',
+      '--http',
+      '127.0.0.1:0',
+    ],
     ...['--data-dir', join(context.folder, 'other')],
   ]);
   try {
@@ -19,11 +30,17 @@ export async function runWork(context) {
     await note(context);
     await ink(context);
     await undo(context);
+    await shapes(context);
+    await laser(context);
     await head(context);
     await tabs(context);
     const { ms, code } = await context.desktop.stop('SIGTERM');
     context.desktop = undefined;
-    context.check('ends on SIGTERM within 2 s', ms < 2000 && code === 0, `${ms.toFixed(0)} ms, code ${code}`);
+    context.check(
+      'ends on SIGTERM within 2 s',
+      ms < 2000 && code === 0,
+      `${ms.toFixed(0)} ms, code ${code}`,
+    );
   } finally {
     await other.stop();
   }
@@ -33,9 +50,13 @@ export async function runWork(context) {
 function objectIn({ desktop, truth }, which = 0) {
   const { video } = desktop.look();
   const inside = ([u, v]) => u > 60 && v > 60 && u < video.width - 60 && v < video.height - 60;
-  const at = ([u, v]) => [video.left + (u + 0.5) * video.scale, video.top + (v + 0.5) * video.scale];
+  const at = ([u, v]) => [
+    video.left + (u + 0.5) * video.scale,
+    video.top + (v + 0.5) * video.scale,
+  ];
   const objects = (truth.frame(video.frame)?.objects ?? []).filter(
-    ({ visible, pixel }) => visible && pixel && inside(pixel) && !covered(desktop.look(), at(pixel)),
+    ({ visible, pixel }) =>
+      visible && pixel && inside(pixel) && !covered(desktop.look(), at(pixel)),
   );
   const object = objects[which % Math.max(objects.length, 1)];
   if (!object) return undefined;
@@ -87,10 +108,17 @@ async function ink(context) {
   screen.input('mousedown', 1);
   for (let i = -40; i <= 40; i += 8) screen.move([x + i, y + 12 * Math.sin(i / 8)]);
   screen.input('mouseup', 1);
-  const shown = await desktop.until('the stroke', (now) => marked(before)(now) || now.refused.video !== '');
+  const shown = await desktop.until(
+    'the stroke',
+    (now) => marked(before)(now) || now.refused.video !== '',
+  );
   const mark = shown.marks.find(({ id }) => !before.has(id));
   const kept = context.annotations().find(({ id }) => id === mark?.id);
-  check('a stroke drawn with the mouse is ink', kept?.shape === 'ink', kept?.shape ?? shown.refused.video);
+  check(
+    'a stroke drawn with the mouse is ink',
+    kept?.shape === 'ink',
+    kept?.shape ?? shown.refused.video,
+  );
   await desktop.until('live again', ({ video }) => !video.frozen);
 }
 
@@ -107,6 +135,77 @@ async function undo(context) {
   check('undo and redo by their keys', true, `${before} marks, ${before - 1}, ${before}`);
 }
 
+/** A pin, a box, and a distance between two clicks. */
+async function shapes(context) {
+  const { desktop, screen, check } = context;
+  const placed = [];
+  for (const [key, tool, clicks] of [
+    ['1', 'Pin', 1],
+    ['b', 'Box', 1],
+    ['d', 'Distance', 2],
+  ]) {
+    screen.press(key);
+    await desktop.until(`${tool} is in hand`, (shown) => shown.tool === tool);
+    const before = idsOf(desktop.look());
+    for (let i = 0; i < clicks; ++i) {
+      screen.click(await findObject(context, i + 2));
+      await sleep(300);
+    }
+    const shown = await desktop.until(
+      tool,
+      (now) => marked(before)(now) || now.refused.video !== '',
+    );
+    const mark = shown.marks.find(({ id }) => !before.has(id));
+    placed.push(context.annotations().find(({ id }) => id === mark?.id));
+  }
+  context.shot('shapes');
+  const [pin, box, measure] = placed;
+  check(
+    'a pin has a number, a box is 10 cm, a distance a length with its sigma',
+    pin?.shape === 'pin' &&
+      box?.shape === 'box' &&
+      measure?.shape === 'measure' &&
+      measure.length_m > 0.01,
+    `${pin?.shape} ${pin?.number}, ${box?.shape}, ${JSON.stringify(measure?.length_m)} ± ${measure?.length_sigma_m} m`,
+  );
+}
+
+/** The pointer of one is seen by the other while it is pressed, and then gone. */
+async function laser(context) {
+  const { desktop, screen, check } = context;
+  const folder = mkdtempSync(join(tmpdir(), 'saccade-desktop-test-'));
+  const other = await Screen.start(folder, 1280, 720);
+  const words = ['--server', context.grpc, '--plain', '--name', 'Uwe'];
+  const second = await Desktop.start(context.options.client, words, other, folder);
+  try {
+    await second.until('tracking', ({ status }) => status.startsWith('tracking'), 30_000);
+    screen.press('w');
+    await desktop.until('the laser is in hand', ({ tool }) => tool === 'Laser pointer');
+    const [x, y] = await findObject(context, 0);
+    screen.move([x, y]);
+    const begin = performance.now();
+    screen.input('mousedown', 1);
+    await second.until('the laser', ({ lasers }) => lasers === 1);
+    const seen = performance.now() - begin;
+    for (let i = 0; i < 5; ++i) screen.move([x + 4 * i, y]);
+    other.shot(join(folder, 'laser.png'));
+    screen.input('mouseup', 1);
+    const up = performance.now();
+    await second.until('it is gone', ({ lasers }) => lasers === 0);
+    const kept = context.annotations().length;
+    check(
+      'a laser pointer is seen by the other expert, and gone when let go',
+      seen < 1000,
+      `seen after ${seen.toFixed(0)} ms, gone after ${(performance.now() - up).toFixed(0)} ms, ${kept} marks as before`,
+    );
+  } finally {
+    await second.stop('SIGKILL');
+    other.stop();
+    rmSync(folder, { recursive: true, force: true });
+  }
+  screen.press('v');
+}
+
 async function head(context) {
   const { desktop, screen, check } = context;
   screen.press('g');
@@ -117,10 +216,18 @@ async function head(context) {
     'the head turns',
     ({ gaze, refused }) => gaze === 'saccade' || gaze === 'fixate' || refused.video !== '',
   );
-  check('a click turns the head, by a lease', turning.lease === 2, `${turning.gaze}; ${turning.refused.video || 'lease held'}`);
+  check(
+    'a click turns the head, by a lease',
+    turning.lease === 2,
+    `${turning.gaze}; ${turning.refused.video || 'lease held'}`,
+  );
   await desktop.until('it holds', ({ arrived }) => arrived, 15_000);
   context.shot('gaze');
-  check('and it holds what was clicked', true, `after ${(performance.now() - begin).toFixed(0)} ms`);
+  check(
+    'and it holds what was clicked',
+    true,
+    `after ${(performance.now() - begin).toFixed(0)} ms`,
+  );
   screen.press('0');
   await desktop.until('home', ({ gaze }) => gaze === 'home');
   screen.press('q');
@@ -133,7 +240,11 @@ async function tabs(context) {
   const { desktop, screen, check } = context;
   const first = desktop.look();
   screen.press('ctrl+Tab');
-  const second = await desktop.until('the other wearer', ({ tab, video }) => tab === 1 && video !== null, 20_000);
+  const second = await desktop.until(
+    'the other wearer',
+    ({ tab, video }) => tab === 1 && video !== null,
+    20_000,
+  );
   await desktop.until('tracking there', ({ status }) => status.startsWith('tracking'), 60_000);
   context.shot('tabs');
   check(

@@ -96,14 +96,6 @@ TEST_F(SettingsFiles, OnesThatMakeNoSenseAreNamedAndChangeNothing) {
   EXPECT_TRUE(LoadSettings(folder_ / "none.toml", settings).ok());
 }
 
-TEST_F(SettingsFiles, ThePersonIsTheSameNextTime) {
-  setenv("XDG_STATE_HOME", folder_.c_str(), 1);
-  const std::string key = PersonKey();
-  EXPECT_EQ(key.size(), 64u);
-  EXPECT_EQ(PersonKey(), key);
-  unsetenv("XDG_STATE_HOME");
-}
-
 TEST(Snapshot, HasItsFactsInsideAndIsStillAPng) {
   std::string png("\x89PNG\r\n\x1a\n", 8);
   png += std::string("\0\0\0\0IEND\xae\x42\x60\x82", 12);
