@@ -96,7 +96,8 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
                {"refused",
                 {{"map", state.Refusal("map")},
                  {"video", state.Refusal("video")},
-                 {"head", state.Refusal("head")}}},
+                 {"head", state.Refusal("head")},
+                 {"laser", state.Refusal("Laser pointer")}}},
                {"gaze", told.gaze ? ToString(told.gaze->mode) : ""},
                {"arrived", told.gaze && told.gaze->arrived},
                {"lease", static_cast<int>(desk.pilot().kind())}};

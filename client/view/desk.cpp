@@ -13,6 +13,7 @@ namespace saccade::view {
 namespace {
 
 constexpr double kFieldOfViewRad = std::numbers::pi / 4;
+constexpr Timestamp kSayAgainNs = 400'000'000;
 
 }  // namespace
 
@@ -33,6 +34,8 @@ Desk::News Desk::Poll(Timestamp now_ns) {
     has_picture = true;
   }
   changed = pilot_.Check() || changed;
+  // Held still it is said again: after a second without a word it would be gone.
+  if (!laser_id_.empty() && now_ns - pointed_ns_ > kSayAgainNs) PointAt(pointed_at_, false);
   changed = state_.Expire(now_ns) || changed;
   changed = session().Expire(now_ns) || changed;
   // A still of a map that is gone shows marks where they are not.

@@ -137,6 +137,7 @@ class Desk {
   std::optional<PixelTarget> pressed_pixel_;
   std::string laser_id_;  // of the point that is shown to others; empty: none
   Timestamp pointed_ns_ = 0;
+  AnnotationTarget pointed_at_;
   void PointAt(const AnnotationTarget& target, bool released);
   std::optional<std::string> moving_;  // id of the mark that is dragged
   std::optional<Eigen::Vector3d> dragged_to_;

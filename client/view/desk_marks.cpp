@@ -93,6 +93,10 @@ void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* vie
     if (!state_.still) Freeze(MonotonicNow());
     state_.ink.Begin(picture->facts->frame_id, pixel);
   }
+  if (state_.tool == tools::Action::kLaser && pressed_->landing && session().link.live()) {
+    laser_id_ = net::RandomUuid();
+    PointAt(pressed_->landing->target, false);
+  }
   const bool selected = !pressed_->picked_id.empty() && pressed_->picked_id == state_.selected_id;
   if (state_.tool == tools::Action::kSelect && selected) moving_ = pressed_->picked_id;
 }
@@ -106,6 +110,7 @@ void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view
 /// Never stored; without a word for a second it is gone by itself.
 void Desk::PointAt(const AnnotationTarget& target, bool released) {
   pointed_ns_ = MonotonicNow();
+  pointed_at_ = target;
   edits_.Point({laser_id_, target, released, state_.color_rgba}, Tell("Laser pointer"));
   if (released) laser_id_.clear();
 }

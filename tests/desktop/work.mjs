@@ -185,7 +185,10 @@ async function laser(context) {
     screen.move([x, y]);
     const begin = performance.now();
     screen.input('mousedown', 1);
-    await second.until('the laser', ({ lasers }) => lasers === 1);
+    await second.until('the laser', ({ lasers }) => lasers === 1).catch((error) => {
+      const { refused, tool } = desktop.look();
+      throw new Error(`${tool}, refused ${JSON.stringify(refused)}: ${error.message}`);
+    });
     const seen = performance.now() - begin;
     for (let i = 0; i < 5; ++i) screen.move([x + 4 * i, y]);
     other.shot(join(folder, 'laser.png'));
