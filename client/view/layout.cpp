@@ -5,7 +5,7 @@
 namespace saccade::view {
 namespace {
 
-constexpr float kHeader = 38, kTabs = 30, kStrip = 26, kTools = 128, kGaze = 236, kMargin = 14;
+constexpr float kHeader = 38, kTabs = 30, kStrip = 26, kTools = 142, kGaze = 236, kMargin = 14;
 constexpr float kRoom = 24;  // round the camera: its picture is drawn there
 constexpr std::int64_t kPatienceNs = 500'000'000;
 constexpr float kEdge = 6;  // half of what can be gripped
