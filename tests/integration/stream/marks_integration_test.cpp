@@ -49,7 +49,7 @@ class Person {
     request.set_role(role);
     request.set_person_key(key);
     grpc::ClientContext context;
-    const grpc::Status status = session_->Join(&context, request, &joined);
+    status = session_->Join(&context, request, &joined);
     EXPECT_TRUE(status.ok()) << status.error_message();
   }
   template <typename Service, typename Request, typename Response>
