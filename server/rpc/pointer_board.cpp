@@ -46,8 +46,10 @@ absl::Status PointerBoard::Say(const Session& session, PointerWord word, Timesta
   auto held = std::find_if(held_.begin(), held_.end(), same);
   if (held != held_.end() && held->pointer.released) {
     if (word.points.empty()) return absl::OkStatus();
-    return absl::FailedPreconditionError(
-        "stroke_id: this one was released, or silent for a second; begin another");
+    if (!held->silenced) {
+      return absl::FailedPreconditionError("stroke_id: this one was released; begin another");
+    }
+    held->silenced = held->pointer.released = false;
   }
   if (held == held_.end()) {
     if (word.points.empty()) return absl::OkStatus();  // released before it began
@@ -133,7 +135,7 @@ Timestamp PointerBoard::Expire(Timestamp now_ns) {
   for (Held& held : held_) {
     if (held.pointer.released || now_ns - held.pointer.time_ns < kSilence) continue;
     Release(held, now_ns);
-    any = true;
+    held.silenced = any = true;
   }
   any |= std::erase_if(held_, [now_ns](const Held& held) {
            return held.pointer.released && now_ns - held.released_ns >= kLinger;

@@ -44,6 +44,7 @@ class PointerBoard {
   std::optional<StrokeSurface> SurfaceOf(const Session& session,
                                          const std::string& stroke_id) const;
 
+  /// Who was silent for too long goes on where they were.
   ///   FailedPrecondition  the stroke was released already
   ///   ResourceExhausted   the stroke is too long, or too many pointers live
   absl::Status Say(const Session& session, PointerWord word, Timestamp now_ns = MonotonicNow());
@@ -62,6 +63,7 @@ class PointerBoard {
     std::string access_id;
     std::optional<StrokeSurface> surface;
     Timestamp released_ns = 0;
+    bool silenced = false;  // released for its silence alone: its next word goes on with it
   };
   void Release(Held& held, Timestamp now_ns);
   template <typename Whose>

@@ -34,6 +34,10 @@ bool PointerReader::Next(const PointerList& list, v1::PointerEvent& event) {
       known->second.kind = pointer.kind;
     }
     Told& told = known->second;
+    if (told.ended && !pointer.released) {  // it was only silent: all of it once more
+      told.ended = false;
+      told.points = 0;
+    }
     told.there = true;
     if (told.version == pointer.version) continue;
     const bool laser = pointer.kind == PointerKind::kLaser;

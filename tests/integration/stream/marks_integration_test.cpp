@@ -49,7 +49,7 @@ class Person {
     request.set_role(role);
     request.set_person_key(key);
     grpc::ClientContext context;
-    const grpc::Status status = session_->Join(&context, request, &joined);
+    status = session_->Join(&context, request, &joined);
     EXPECT_TRUE(status.ok()) << status.error_message();
   }
   template <typename Service, typename Request, typename Response>
@@ -188,7 +188,8 @@ TEST(Marks, APointerIsSeenByTheOthersAtOnceAndGoneAfterASecond) {
   for (int i = 0; i < 60; ++i) {
     const auto sent = steady_clock::now();
     const double u = 100 + i;
-    ASSERT_TRUE(ann.Point(Laser(1, watcher.NewestFrame(), u, 120)).ok());
+    const grpc::Status status = ann.Point(Laser(1, watcher.NewestFrame(), u, 120));
+    ASSERT_TRUE(status.ok()) << status.error_message();
     ASSERT_TRUE(watcher.WaitFor(
         [&](const auto& events) {
           std::size_t words = 0;

@@ -63,7 +63,7 @@ AnnotationDraft Between(FrameId frame, const Eigen::Vector2d& from, const Eigen:
 TEST(Measure, SigmaIsHonestOverManyMaps) {
   const Rigid3 pose = LookFrom({0, 0, 0}, 0, 0.35);
   double squares = 0, claims = 0;
-  int runs = 0, within = 0;
+  int runs = 0, within = 0, untrusted = 0;
   for (unsigned seed = 1; seed <= 120; ++seed) {
     SyntheticMap::Options options;
     options.seed = seed;
@@ -74,18 +74,18 @@ TEST(Measure, SigmaIsHonestOverManyMaps) {
     const auto made = rig.manager.Create(Between(rig.map.next_frame - 1, from, to), "ann");
     ASSERT_TRUE(made.ok()) << made.status();
     const Annotation& annotation = made->annotation;
-    if (annotation.anchor.state == AnchorState::kPaused) continue;  // says: do not trust
+    untrusted += annotation.anchor.state == AnchorState::kPaused;
     const double error = annotation.length_m - truth;
     squares += std::pow(error / annotation.length_sigma_m, 2);
     claims += annotation.length_sigma_m;
     within += std::abs(error) < 2 * annotation.length_sigma_m;
     ++runs;
   }
-  ASSERT_GT(runs, 60);
   const double rms = std::sqrt(squares / runs);
   std::printf(
-      "measure: %d runs, rms error / sigma %.2f, within 2 sigma %.0f %%, mean sigma %.1f mm\n",
-      runs, rms, 100.0 * within / runs, 1e3 * claims / runs);
+      "measure: %d runs, %d not trusted yet, rms error / sigma %.2f, within 2 sigma %.0f %%, mean "
+      "sigma %.1f mm\n",
+      runs, untrusted, rms, 100.0 * within / runs, 1e3 * claims / runs);
   EXPECT_LT(rms, 1.3) << "it promises too much";
   EXPECT_GT(rms, 0.2) << "it promises next to nothing";
   EXPECT_GT(within, 0.9 * runs);

@@ -90,6 +90,21 @@ TEST_F(Board, TheSilentAreReleasedAfterASecondByThemselvesAndForgottenAfterAnoth
   EXPECT_TRUE(list()->empty());
 }
 
+TEST_F(Board, WhoWasOnlySilentGoesOnAndReadersGetAllOfItAgain) {
+  ASSERT_TRUE(board_.Say(Ann(), Word(PointerKind::kSketch, kStroke, 2)).ok());
+  PointerReader reader;
+  v1::PointerEvent before, ended, again;
+  ASSERT_TRUE(reader.Next(*list(), before));
+  board_.Expire(MonotonicNow() + PointerBoard::kSilence);
+  ASSERT_TRUE(reader.Next(*list(), ended));
+  EXPECT_TRUE(ended.pointers(0).released());
+  ASSERT_TRUE(board_.Say(Ann(), Word(PointerKind::kSketch, kStroke, 1, 2)).ok());
+  ASSERT_TRUE(reader.Next(*list(), again));
+  EXPECT_FALSE(again.pointers(0).released());
+  EXPECT_EQ(again.pointers(0).first(), 0u);
+  EXPECT_EQ(again.pointers(0).points_in_world_m_size(), 3);
+}
+
 TEST_F(Board, EndsWithItsSessionAndWithItsToken) {
   ASSERT_TRUE(board_.Say(Ann(), Word(PointerKind::kLaser, kStroke, 1)).ok());
   board_.EndParticipant("bob");

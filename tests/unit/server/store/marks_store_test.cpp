@@ -12,37 +12,38 @@ namespace {
 using ::testing::SizeIs;
 using testing::StoreTest;
 
-AnnotationChange Of(std::uint64_t sequence, const std::string& id, AnnotationShape shape) {
-  AnnotationChange change = StoreTest::Change(sequence, id);
-  change.person_id = "person";
-  Annotation& annotation = change.after->annotation;
-  annotation.shape = shape;
-  annotation.author_person_id = "author";
-  annotation.locked = true;
-  annotation.locked_by = "Ann";
-  if (shape != AnnotationShape::kInk) annotation.ink_offset_m = {};
-  if (shape == AnnotationShape::kBox) annotation.extent_m = {0.1, 0.2, 0.3};
-  if (shape == AnnotationShape::kArrow) annotation.world_from_mark = Eigen::Quaterniond(0, 0, 1, 0);
-  if (shape == AnnotationShape::kMeasure) {
-    annotation.ink_offset_m = {{0.3, 0.4, 0}};
-    annotation.length_m = 0.5;
-    annotation.length_sigma_m = 0.01;
-    change.after->end_covariance_in_world = 2e-4 * Eigen::Matrix3d::Identity();
-  }
-  if (shape == AnnotationShape::kPin) annotation.number = 12;
-  if (shape == AnnotationShape::kPicture) {
-    annotation.picture = std::make_shared<Picture>(
-        Picture{"abcd", "image/jpeg", 40, 30, std::string("\xff\xd8\0\xff", 4)});
-  }
-  if (shape == AnnotationShape::kCheckList) {
-    annotation.check_items = std::make_shared<std::vector<CheckItem>>(
-        std::vector<CheckItem>{{"oil", true, "Bob", 77}, {"lid", false, "", 0}});
-  }
-  return change;
-}
-
 class MarksStore : public StoreTest {
  protected:
+  static AnnotationChange Of(std::uint64_t sequence, const std::string& id, AnnotationShape shape) {
+    AnnotationChange change = Change(sequence, id);
+    change.person_id = "person";
+    Annotation& annotation = change.after->annotation;
+    annotation.shape = shape;
+    annotation.author_person_id = "author";
+    annotation.locked = true;
+    annotation.locked_by = "Ann";
+    if (shape != AnnotationShape::kInk) annotation.ink_offset_m = {};
+    if (shape == AnnotationShape::kBox) annotation.extent_m = {0.1, 0.2, 0.3};
+    if (shape == AnnotationShape::kArrow)
+      annotation.world_from_mark = Eigen::Quaterniond(0, 0, 1, 0);
+    if (shape == AnnotationShape::kMeasure) {
+      annotation.ink_offset_m = {{0.3, 0.4, 0}};
+      annotation.length_m = 0.5;
+      annotation.length_sigma_m = 0.01;
+      change.after->end_covariance_in_world = 2e-4 * Eigen::Matrix3d::Identity();
+    }
+    if (shape == AnnotationShape::kPin) annotation.number = 12;
+    if (shape == AnnotationShape::kPicture) {
+      annotation.picture = std::make_shared<Picture>(
+          Picture{"abcd", "image/jpeg", 40, 30, std::string("\xff\xd8\0\xff", 4)});
+    }
+    if (shape == AnnotationShape::kCheckList) {
+      annotation.check_items = std::make_shared<std::vector<CheckItem>>(
+          std::vector<CheckItem>{{"oil", true, "Bob", 77}, {"lid", false, "", 0}});
+    }
+    return change;
+  }
+
   std::string Query(const std::string& sql) {
     auto database = SqliteDatabase::Open(file());
     EXPECT_TRUE(database.ok());
