@@ -7,8 +7,6 @@ export function lengthWords(lengthM: number, sigmaM: number, metric: boolean): s
   return `${(1000 * lengthM).toFixed(0)} ± ${Math.max(1, 1000 * sigmaM).toFixed(0)} mm`;
 }
 
-const both = (first: string, text: string): string => (text ? `${first}: ${text}` : first);
-
 type Worded = Pick<Mark, 'shape' | 'text' | 'number' | 'lengthM' | 'lengthSigmaM' | 'checkItems'>;
 
 /** What a mark says, as the server's overlay has it; a check list with a line for each item. */
@@ -18,9 +16,11 @@ export function markWords(mark: Worded, metric: boolean): string {
     case 'note':
       return text || 'note';
     case 'measure':
-      return lengthM > 0 ? both(lengthWords(lengthM, lengthSigmaM, metric), text) : text;
+      return [text, lengthM > 0 ? lengthWords(lengthM, lengthSigmaM, metric) : '']
+        .filter(Boolean)
+        .join(': ');
     case 'pin':
-      return number > 0 ? both(String(number), text) : text;
+      return [number > 0 ? String(number) : '', text].filter(Boolean).join(': ');
     case 'check_list': {
       const done = checkItems.filter((item) => item.done).length;
       const lines = checkItems.map((item) => `${item.done ? '☑' : '☐'} ${item.text}`);

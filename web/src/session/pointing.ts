@@ -63,7 +63,7 @@ export class Pointing {
     this.timer = setTimeout(() => {
       this.timer = undefined;
       void this.send();
-    }, wait);
+    }, Math.ceil(wait));
   }
 
   private async send(): Promise<void> {

@@ -64,15 +64,21 @@ export class Grips {
     return new LaserDrag(this.session, this.state, this.aim, pane, x, y);
   }
 
+  /** The live picture holds while one draws in it: a hand cannot follow a head. */
   private ink(pane: PaneName, pixel: Pixel, { x, y }: Press): Drag | undefined {
     const { session, edits, state, aim } = this;
+    const holds = pane === 'video' && !aim.video.frozen && aim.video.freeze();
+    const goOn = (): void => {
+      if (holds) aim.video.thaw();
+    };
     const landing = aim.landing(pane, pixel, true);
     const view = aim.view(pane);
     if (!landing || !view) {
+      goOn();
       state.refuse(pane, `Not drawn: ${aim.whyNoLanding(pane)}`);
       return undefined;
     }
-    const drag = new InkDrag(session, edits, state, aim, pane, landing, view);
+    const drag = new InkDrag(session, edits, state, aim, pane, { landing, view, goOn });
     drag.move(x, y);
     return drag;
   }

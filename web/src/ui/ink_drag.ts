@@ -12,9 +12,16 @@ import type { AppState, PaneName } from './app_state';
 import { attempt } from './attempt';
 import type { Drag } from './drag';
 
-const HOLD_MS = 5000; // the server keeps a frame for 10 s, and longer once it was asked for
 const TOLERANCE_PX = 0.6; // of what is kept, against what was drawn
 const MOST_POINTS = 2000; // annotation.proto
+
+/** Of the press, in the frame the stroke belongs to. */
+export interface InkBegun {
+  readonly landing: Landing;
+  readonly view: View;
+  /** The stroke is done, or given up. */
+  goOn(): void;
+}
 
 /** A stroke from the press to the server's answer: others see it grow, and then it is a mark. */
 export class InkDrag implements Drag {
@@ -24,30 +31,22 @@ export class InkDrag implements Drag {
   private readonly pendingId = newUuid();
   private readonly pointing: Pointing;
   private readonly inWorld: Vec3[] = [];
+  private readonly colorRgba: number;
   private last: Pixel | undefined;
-  private readonly holding: ReturnType<typeof setTimeout> | undefined;
 
-  /** `landing` and `view`: of the press, in the frame the stroke belongs to. */
   constructor(
     private readonly session: Session,
     private readonly edits: Edits,
     private readonly state: AppState,
     private readonly aim: Aim,
     private readonly pane: PaneName,
-    private readonly landing: Landing,
-    private readonly first: View,
+    private readonly begun: InkBegun,
   ) {
-    this.plane = planeOf(landing, first);
+    this.plane = planeOf(begun.landing, begun.view);
     this.colorRgba = state.colorRgba;
     // Said once it is a mark, or not: what the others miss meanwhile is no reason to stop.
     this.pointing = new Pointing(session, 'sketch', this.colorRgba, () => undefined);
-    const { target } = landing;
-    if (target.kind !== 'pixel') return;
-    const hold = (): void => void session.fetchPng(target.frameId).catch(() => undefined);
-    this.holding = setTimeout(hold, HOLD_MS);
   }
-
-  private readonly colorRgba: number;
 
   move(x: number, y: number): void {
     const at = this.smoother.add({ u: x, v: y }, performance.now());
@@ -79,7 +78,6 @@ export class InkDrag implements Drag {
   }
 
   end(x: number, y: number): void {
-    clearTimeout(this.holding);
     this.put({ u: x, v: y });
     const { pane, state, edits } = this;
     const [origin] = this.inWorld;
@@ -89,7 +87,7 @@ export class InkDrag implements Drag {
     }
     // In one piece with its answer, so that nobody sees it go and come back.
     const kept = this.kept();
-    const { target, later } = this.landing;
+    const { target, later } = this.begun.landing;
     const placing = edits.place({
       ...{ shape: 'ink', text: '', colorRgba: this.colorRgba, target, later },
       guessInWorld: origin,
@@ -97,6 +95,7 @@ export class InkDrag implements Drag {
       inkOffsetsM: kept.map(({ point }) => subtract(point, origin)),
     });
     this.session.annotations.removePending(this.pendingId);
+    this.begun.goOn();
     void attempt(state, pane, () => placing).then(() => this.pointing.end());
   }
 
@@ -104,7 +103,7 @@ export class InkDrag implements Drag {
   private kept(): { pixel: Pixel; point: Vec3 }[] {
     const seen: { pixel: Pixel; point: Vec3 }[] = [];
     for (const point of this.inWorld) {
-      const pixel = projectPoint(this.first, point);
+      const pixel = projectPoint(this.begun.view, point);
       if (pixel) seen.push({ pixel, point });
     }
     const pixels = seen.map(({ pixel }) => pixel);
@@ -116,7 +115,7 @@ export class InkDrag implements Drag {
   }
 
   cancel(): void {
-    clearTimeout(this.holding);
+    this.begun.goOn();
     this.session.annotations.removePending(this.pendingId);
     this.pointing.end();
   }
