@@ -76,13 +76,21 @@ export async function placeIn(expert, x, y) {
   return [left + x * width * scale, top + y * height * scale];
 }
 
-/** Waits for a mark of a shape that was not there; its annotation, or undefined. */
+/**
+ * Waits for a mark of a shape that was not there; its annotation, or undefined. A loaded computer loses the
+ * camera now and then, and the page says so: then it is done again, as a person would.
+ */
 export async function made(context, shape, act) {
-  const before = new Set((await listOf(context)).map(({ id }) => id));
-  await act();
-  return listWhen(context, (list) =>
-    list.find((each) => !before.has(each.id) && each.shape === shape),
-  );
+  for (let tries = 0; ; ++tries) {
+    await context.ann.waitForStatus(/^tracking/, 60_000);
+    const before = new Set((await listOf(context)).map(({ id }) => id));
+    await act();
+    const mark = await listWhen(context, (list) =>
+      list.find((each) => !before.has(each.id) && each.shape === shape),
+    );
+    if (mark || tries === 2) return mark;
+    console.log(`      again: ${await noteOf(context.ann)}`);
+  }
 }
 
 /** What a pane says. */
