@@ -190,6 +190,10 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kListAnnotations:
     case Command::kShowAnnotation:
     case Command::kDeleteAnnotation:
+    case Command::kLock:
+    case Command::kUnlock:
+    case Command::kTick:
+    case Command::kPicture:
     case Command::kUndo:
     case Command::kRedo:
       return RunAnnotations(options, connection);

@@ -128,15 +128,44 @@ json ToJson(const net::MapState& map) {
 }
 
 json ToJson(const Annotation& annotation, bool metric) {
-  return {{"id", annotation.id},
-          {"shape", Word(annotation.shape)},
-          {"text", annotation.text},
-          {"author", annotation.author},
-          {"size_m", annotation.size_m},
-          {"color_rgba", absl::StrFormat("%08x", annotation.color_rgba)},
-          {"created_unix_ns", Nanoseconds(annotation.created_unix_ns)},
-          {"revision", Whole(annotation.revision)},
-          {"anchor", ToJson(annotation.anchor, metric)}};
+  json out = {{"id", annotation.id},
+              {"shape", Word(annotation.shape)},
+              {"text", annotation.text},
+              {"author", annotation.author},
+              {"size_m", annotation.size_m},
+              {"color_rgba", absl::StrFormat("%08x", annotation.color_rgba)},
+              {"created_unix_ns", Nanoseconds(annotation.created_unix_ns)},
+              {"revision", Whole(annotation.revision)},
+              {"anchor", ToJson(annotation.anchor, metric)},
+              {"author_person_id", annotation.author_person_id},
+              {"locked", annotation.locked}};
+  if (annotation.number > 0) out["number"] = annotation.number;
+  if (annotation.shape == AnnotationShape::kBox) out["extent_m"] = Numbers(annotation.extent_m);
+  if (const auto& q = annotation.world_from_mark) {
+    out["world_from_mark_xyzw"] = {q->x(), q->y(), q->z(), q->w()};
+  }
+  if (annotation.shape == AnnotationShape::kMeasure) {
+    out["offset_m"] = Numbers(annotation.ink_offset_m[0]);
+    out["length_m"] = annotation.length_m;
+    out["length_sigma_m"] = annotation.length_sigma_m;
+  }
+  if (annotation.picture) {
+    out["picture"] = {{"sha256", annotation.picture->sha256},
+                      {"media_type", annotation.picture->media_type},
+                      {"width", annotation.picture->width},
+                      {"height", annotation.picture->height}};
+  }
+  if (annotation.check_items) {
+    json items = json::array();
+    for (const CheckItem& item : *annotation.check_items) {
+      items.push_back({{"text", item.text},
+                       {"done", item.done},
+                       {"done_by", item.done_by},
+                       {"done_unix_ns", Nanoseconds(item.done_unix_ns)}});
+    }
+    out["check_items"] = std::move(items);
+  }
+  return out;
 }
 
 json ToJson(const std::vector<Annotation>& annotations, bool metric) {

@@ -37,6 +37,7 @@ absl::Status RunWithSession(cli::Options& options) {
   net::ConnectionOptions& to = options.connection;
   // Watching is a session of its own; editing goes on in the one of the last run.
   const bool keeps_session = options.command != cli::Command::kWatch;
+  to.person_key = cli::PersonKey(to.server, to.display_name);
   if (keeps_session) to.session_id = cli::LoadSession(to.server, to.display_name);
   const auto connection = net::Connection::Create(to);
   if (!connection.ok()) return connection.status();

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "client/cli/access_commands.hpp"
+#include "client/cli/annotate_options.hpp"
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/record_command.hpp"
@@ -18,36 +19,7 @@
 namespace saccade::cli {
 namespace {
 
-// As typed, before it is checked.
-struct Raw {
-  double timeout_s = 5;
-  std::string view = "raw";
-  std::string shape = "cube";
-  std::string pixel, point, stroke, color;
-  std::optional<std::uint64_t> feature;
-  std::string annotation;  // fixate
-};
-
-const std::map<std::string, AnnotationShape>& Shapes() {
-  static const std::map<std::string, AnnotationShape> shapes = {{"cube", AnnotationShape::kCube},
-                                                                {"note", AnnotationShape::kNote},
-                                                                {"arrow", AnnotationShape::kArrow},
-                                                                {"ink", AnnotationShape::kInk}};
-  return shapes;
-}
-
-// A validator that leaves the text as it is.
-template <typename Parse>
-CLI::Validator Checked(Parse parse, const std::string& form) {
-  return CLI::Validator(
-      [parse](std::string& text) {
-        const auto parsed = parse(text);
-        return parsed.ok() ? std::string() : std::string(parsed.status().message());
-      },
-      form);
-}
-
-void AddMapAndPictures(CLI::App& app, Options& options, Raw& raw) {
+void AddMapAndPictures(CLI::App& app, Options& options, RawOptions& raw) {
   app.add_subcommand("status", "What the server is doing now");
   CLI::App* watch =
       app.add_subcommand("watch", "Follow it: a line a second, or each event as JSON");
@@ -64,48 +36,7 @@ void AddMapAndPictures(CLI::App& app, Options& options, Raw& raw) {
       ->check(Id());
 }
 
-void AddAnnotate(CLI::App& app, Options& options, Raw& raw) {
-  CLI::App* annotate = app.add_subcommand("annotate", "Place an annotation");
-  CLI::Option* pixel =
-      annotate->add_option("--pixel", raw.pixel, "U,V in the raw picture; (0,0) is its first pixel")
-          ->check(Checked([](const std::string& t) { return ParseNumbers(t, 2); }, "U,V"));
-  annotate->add_option("--frame", options.frame, "Frame id of that picture; else the newest")
-      ->check(Id())
-      ->needs(pixel);
-  CLI::Option* feature =
-      annotate->add_option("--feature", raw.feature, "Id of a feature")->check(Id());
-  CLI::Option* point =
-      annotate->add_option("--point", raw.point, "X,Y,Z in world [m]")
-          ->check(Checked([](const std::string& t) { return ParseNumbers(t, 3); }, "X,Y,Z"));
-  pixel->excludes(feature)->excludes(point);
-  feature->excludes(point);
-  annotate->add_option("--shape", raw.shape, "cube, note, arrow or ink")
-      ->check(CLI::IsMember({"cube", "note", "arrow", "ink"}))
-      ->capture_default_str();
-  annotate->add_option("--text", options.draft.text, "Text, at most 500 bytes")->check(Utf8());
-  annotate->add_option("--size", options.draft.size_m, "Size [m]")
-      ->check(Number(0.001, 10.0))
-      ->capture_default_str();
-  annotate->add_option("--color", raw.color, "RRGGBB, for example ff9a3d (else white)")
-      ->check(Checked(ParseColor, "RRGGBB"));
-  annotate->add_option("--stroke", raw.stroke, "U1,V1,U2,V2,... of an ink shape, with --pixel")
-      ->needs(pixel)
-      ->check(Checked(ParseStroke, "U1,V1,U2,V2,..."));
-}
-
-void AddAnnotations(CLI::App& app, Options& options) {
-  CLI::App* annotations = app.add_subcommand("annotations", "List, show, delete or undo");
-  annotations->require_subcommand(0, 1);
-  annotations->add_subcommand("list", "All of them (this is what no word means)");
-  CLI::App* show = annotations->add_subcommand("show", "One of them in full");
-  show->add_option("id", options.id, "Its id, or the beginning of it")->required();
-  CLI::App* remove = annotations->add_subcommand("delete", "Delete one");
-  remove->add_option("id", options.id, "Its id, or the beginning of it")->required();
-  annotations->add_subcommand("undo", "Take back your own last change");
-  annotations->add_subcommand("redo", "Make it again");
-}
-
-void AddGaze(CLI::App& app, Options& options, Raw& raw) {
+void AddGaze(CLI::App& app, Options& options, RawOptions& raw) {
   CLI::App* fixate = app.add_subcommand(
       "fixate", "Turn the camera to a point and hold it there until interrupted (Ctrl-C)");
   CLI::Option* annotation =
@@ -146,6 +77,10 @@ Command CommandOf(const CLI::App& app) {
       {"list", Command::kListAnnotations},
       {"show", Command::kShowAnnotation},
       {"delete", Command::kDeleteAnnotation},
+      {"lock", Command::kLock},
+      {"unlock", Command::kUnlock},
+      {"tick", Command::kTick},
+      {"picture", Command::kPicture},
       {"undo", Command::kUndo},
       {"redo", Command::kRedo},
       {"fixate", Command::kFixate},
@@ -168,31 +103,7 @@ Command CommandOf(const CLI::App& app) {
   return commands.at(chosen->get_name());
 }
 
-// What CLI11 cannot say: exactly one target, strokes only for ink.
-absl::Status FinishDraft(const Raw& raw, AnnotationDraft& draft) {
-  draft.shape = Shapes().at(raw.shape);
-  if (!raw.pixel.empty()) {
-    const std::vector<double> uv = *ParseNumbers(raw.pixel, 2);
-    draft.target = PixelTarget{0, {uv[0], uv[1]}};
-  } else if (raw.feature) {
-    draft.target = FeatureTarget{*raw.feature};
-  } else if (!raw.point.empty()) {
-    const std::vector<double> xyz = *ParseNumbers(raw.point, 3);
-    draft.target = PointTarget{{xyz[0], xyz[1], xyz[2]}};
-  } else {
-    return absl::InvalidArgumentError("annotate needs --pixel U,V, --feature ID or --point X,Y,Z");
-  }
-  const bool ink = draft.shape == AnnotationShape::kInk;
-  if (ink != !raw.stroke.empty()) {
-    return absl::InvalidArgumentError(ink ? "--shape ink needs --stroke U1,V1,U2,V2,..."
-                                          : "--stroke is for --shape ink only");
-  }
-  if (!raw.color.empty()) draft.color_rgba = *ParseColor(raw.color);
-  if (ink) draft.ink_px = *ParseStroke(raw.stroke);
-  return absl::OkStatus();
-}
-
-absl::StatusOr<GazeTarget> GazeOf(const Raw& raw) {
+absl::StatusOr<GazeTarget> GazeOf(const RawOptions& raw) {
   if (!raw.annotation.empty()) return GazeAnnotation{raw.annotation};
   if (raw.feature) return GazeFeature{*raw.feature};
   if (raw.point.empty()) {
@@ -222,7 +133,7 @@ int Usage(bool json, absl::string_view problem) {
 ParseResult ParseCommandLine(int argc, const char* const* argv) {
   const bool json = WantsJson(argc, argv);
   Options options;
-  Raw raw;
+  RawOptions raw;
   options.connection.display_name = "saccade";
   CLI::App app("Talks to a Saccade server: what it sees, its map, its annotations.", "saccade");
   app.set_version_flag("--version", std::string("saccade ") + Version());
@@ -273,7 +184,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
     options.gaze = *std::move(target);
   }
   if (options.command == Command::kAnnotate) {
-    if (absl::Status done = FinishDraft(raw, options.draft); !done.ok()) {
+    if (absl::Status done = FinishDraft(raw, options.picture, options.draft); !done.ok()) {
       return {std::nullopt, Usage(json, done.message())};
     }
   }

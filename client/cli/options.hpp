@@ -27,6 +27,10 @@ enum class Command {
   kListAnnotations,
   kShowAnnotation,
   kDeleteAnnotation,
+  kLock,
+  kUnlock,
+  kTick,
+  kPicture,
   kUndo,
   kRedo,
   kFixate,
@@ -51,14 +55,17 @@ struct Options {
   Command command = Command::kStatus;
   net::ConnectionOptions connection;
   bool json = false;
-  std::string out;                             // map, snapshot, calibrate-mount: file to write
+  std::string out;                             // map, snapshot, picture ...: file to write
   net::VideoView view = net::VideoView::kRaw;  // snapshot
   std::optional<FrameId> frame;                // snapshot, annotate --pixel; nothing: the newest
-  std::string id;                              // show, delete: UUID or the beginning of one
-  double watch_s = 0;                          // watch: end after this time; 0: never
-  AnnotationDraft draft;                       // annotate; frame_id 0 until `frame` is known
-  GazeTarget gaze;                             // fixate
-  bool fast = false;                           // fixate: at the mount's own limits
+  std::string id;          // show, delete, lock, tick ...: UUID or the beginning of one
+  std::uint32_t line = 0;  // tick: from 1
+  bool untick = false;     // tick: on again
+  std::string picture;     // annotate --shape picture: file to read
+  double watch_s = 0;      // watch: end after this time; 0: never
+  AnnotationDraft draft;   // annotate; frame_id 0 until `frame` is known
+  GazeTarget gaze;         // fixate
+  bool fast = false;       // fixate: at the mount's own limits
   // How the server is reached; ResolveAccess makes `connection` of it.
   std::string trust;  // PEM file; empty: the system's store
   bool tls = false, plain = false;

@@ -16,7 +16,13 @@ struct FieldFlag {
   absl::string_view field;  // of the API
   absl::string_view flag;
 };
-constexpr std::array<FieldFlag, 14> kFlags = {{{"target.frame_pixel.pixel", "--pixel"},
+constexpr std::array<FieldFlag, 20> kFlags = {{{"end_target.frame_pixel.pixel", "--to-pixel"},
+                                               {"end_target.feature_id", "--to-feature"},
+                                               {"end_target.point_in_world_m", "--to-point"},
+                                               {"extent_m", "--extent"},
+                                               {"world_from_mark", "--rotation"},
+                                               {"picture", "--picture"},
+                                               {"target.frame_pixel.pixel", "--pixel"},
                                                {"target.frame_pixel.frame_id", "--frame"},
                                                {"target.feature_id", "--feature"},
                                                {"target.annotation_id", "--annotation"},

@@ -18,4 +18,12 @@ std::string LoadSession(const std::string& server, const std::string& name);
 /// costs only undo, so it is no error.
 void SaveSession(const std::string& server, const std::string& name, const std::string& session_id);
 
+/// Beside it, the key that makes all sessions under one name with one server one person's: what
+/// they did can be undone in the next, too.
+std::string PersonFilePath(const std::string& server, const std::string& name);
+
+/// That key, made anew (256 bits) where there is none or others may read it; in a file that is this
+/// user's alone (0600). Empty where it cannot be kept: then each session is a new person.
+std::string PersonKey(const std::string& server, const std::string& name);
+
 }  // namespace saccade::cli

@@ -62,17 +62,8 @@ absl::string_view Word(FeatureState state) {
 }
 
 absl::string_view Word(AnnotationShape shape) {
-  switch (shape) {
-    case AnnotationShape::kCube:
-      return "cube";
-    case AnnotationShape::kNote:
-      return "note";
-    case AnnotationShape::kArrow:
-      return "arrow";
-    case AnnotationShape::kInk:
-      return "ink";
-  }
-  return "unknown";
+  // As --shape has it: one word.
+  return shape == AnnotationShape::kCheckList ? "check-list" : ToString(shape);
 }
 
 absl::string_view Word(AnchorState state) {

@@ -111,6 +111,7 @@ class Connection::Impl {
     v1::JoinRequest request;
     request.set_display_name(options_.display_name);
     request.set_role(ToProto(options_.role));
+    request.set_person_key(options_.person_key);
     request.set_resume_session_id(options_.session_id);  // whose undo goes on, if it is known yet
     absl::StatusOr<v1::JoinResponse> response =
         Call(*session_, &v1::SessionService::Stub::Join, request);
@@ -246,6 +247,12 @@ absl::StatusOr<Annotation> Connection::UpdateAnnotation(const AnnotationPatch& p
   if (patch.size_m) request.set_size_m(*patch.size_m);
   if (patch.color_rgba) request.set_color_rgba(*patch.color_rgba);
   if (patch.target) *request.mutable_target() = wire::ToProto(*patch.target);
+  if (patch.end_target) *request.mutable_end_target() = wire::ToProto(*patch.end_target);
+  if (patch.locked) request.set_locked(*patch.locked);
+  if (patch.world_from_mark) {
+    *request.mutable_world_from_mark() = wire::ToProto(*patch.world_from_mark);
+  }
+  if (patch.extent_m) *request.mutable_extent_m() = wire::ToProto(*patch.extent_m);
   auto response = impl_->CallInSession(*impl_->annotation_, &v1::AnnotationService::Stub::Update,
                                        std::move(request));
   if (!response.ok()) return response.status();
@@ -275,6 +282,30 @@ absl::Status Connection::DeleteAnnotation(const std::string& id) {
   return impl_
       ->CallInSession(*impl_->annotation_, &v1::AnnotationService::Stub::Delete, std::move(request))
       .status();
+}
+
+absl::StatusOr<Annotation> Connection::TickCheckItem(const std::string& id, std::uint32_t index,
+                                                     bool done) {
+  v1::TickCheckItemRequest request;
+  request.set_id(id);
+  request.set_index(index);
+  request.set_done(done);
+  auto response = impl_->CallInSession(
+      *impl_->annotation_, &v1::AnnotationService::Stub::TickCheckItem, std::move(request));
+  if (!response.ok()) return response.status();
+  return wire::FromProto(response->annotation(), "annotation");
+}
+
+absl::StatusOr<Picture> Connection::GetPicture(const std::string& id) {
+  v1::GetPictureRequest request;
+  request.set_id(id);
+  auto response = impl_->CallInSession(
+      *impl_->annotation_, &v1::AnnotationService::Stub::GetPicture, std::move(request));
+  if (!response.ok()) return response.status();
+  return Picture{response->facts().sha256(), response->facts().media_type(),
+                 static_cast<int>(response->facts().width()),
+                 static_cast<int>(response->facts().height()),
+                 std::move(*response->mutable_picture())};
 }
 
 absl::StatusOr<std::string> Connection::Undo() {

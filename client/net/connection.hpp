@@ -32,6 +32,9 @@ struct ConnectionOptions {
   std::string root_pem{};
   /// The name that the certificate must have; empty: `server`'s host.
   std::string tls_name{};
+  /// A secret that stands for the person, kept between sessions: 32 to 64 of [A-Za-z0-9_-]; empty:
+  /// a new person each time.
+  std::string person_key{};
   /// What the server lets in by (AccessClient::Redeem); secret. Empty: none.
   std::string token{};
 
@@ -77,7 +80,11 @@ class Connection {
   /// Page by page until there are no more.
   absl::StatusOr<std::vector<Annotation>> ListAnnotations();
   absl::Status DeleteAnnotation(const std::string& id);
-  /// What was undone or redone, in words. Acts on this session's own last change.
+  /// Ticks line `index` (from 0) of a check list off, or on again.
+  absl::StatusOr<Annotation> TickCheckItem(const std::string& id, std::uint32_t index, bool done);
+  /// The file that a picture was made of.
+  absl::StatusOr<Picture> GetPicture(const std::string& id);
+  /// What was undone or redone, in words. Acts on the person's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();
 

@@ -54,6 +54,16 @@ v1::AnnotationDraft ToProto(const AnnotationDraft& draft) {
   message.set_color_rgba(draft.color_rgba);
   *message.mutable_target() = wire::ToProto(draft.target);
   for (const Eigen::Vector2d& pixel : draft.ink_px) *message.add_ink_px() = wire::ToProto(pixel);
+  for (const Eigen::Vector3d& offset : draft.ink_offset_m) {
+    *message.add_ink_offset_m() = wire::ToProto(offset);
+  }
+  if (draft.end_target) *message.mutable_end_target() = wire::ToProto(*draft.end_target);
+  if (draft.world_from_mark) {
+    *message.mutable_world_from_mark() = wire::ToProto(*draft.world_from_mark);
+  }
+  if (draft.extent_m) *message.mutable_extent_m() = wire::ToProto(*draft.extent_m);
+  if (draft.picture) message.set_picture(draft.picture->bytes);
+  for (const std::string& item : draft.check_items) message.add_check_items(item);
   return message;
 }
 

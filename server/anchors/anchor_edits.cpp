@@ -1,4 +1,5 @@
-// The edits of AnchorManager: create, change, delete, and taking them back.
+// The edits of AnchorManager: create, change, tick, delete.
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -18,8 +19,30 @@ std::int64_t UnixNow() {
       .count();
 }
 
-RecordPtr Copy(const AnchorRecord* record) {
-  return record ? std::make_shared<const AnchorRecord>(*record) : nullptr;
+Annotation Drafted(const AnnotationDraft& draft, const Editor& editor) {
+  Annotation annotation;
+  annotation.id = MakeUuid();
+  annotation.shape = draft.shape;
+  annotation.text = draft.text;
+  annotation.author = draft.author;
+  annotation.author_person_id = editor.person_id;
+  annotation.size_m = draft.size_m;
+  annotation.color_rgba = draft.color_rgba;
+  annotation.created_unix_ns = UnixNow();
+  annotation.revision = 1;
+  if (draft.shape == AnnotationShape::kArrow || draft.shape == AnnotationShape::kBox) {
+    annotation.world_from_mark = draft.world_from_mark;
+  }
+  if (draft.shape == AnnotationShape::kBox) {
+    annotation.extent_m = draft.extent_m.value_or(Eigen::Vector3d::Constant(draft.size_m));
+  }
+  if (draft.shape == AnnotationShape::kPicture) annotation.picture = draft.picture;
+  if (draft.shape == AnnotationShape::kCheckList) {
+    auto items = std::make_shared<std::vector<CheckItem>>();
+    for (const std::string& text : draft.check_items) items->push_back({text, false, "", 0});
+    annotation.check_items = std::move(items);
+  }
+  return annotation;
 }
 
 }  // namespace
@@ -42,16 +65,15 @@ absl::Status AnchorManager::CheckReady() const {
   return absl::FailedPreconditionError("no frame has been tracked yet; wait for video");
 }
 
-/// Gives `record` a new place at `target`.
-absl::Status AnchorManager::Place(const AnnotationTarget& target,
-                                  const std::vector<Eigen::Vector2d>& ink_px,
-                                  AnchorRecord& record) {
+/// Hangs `place` anew, at `target`.
+absl::StatusOr<ResolvedTarget> AnchorManager::Hang(const AnnotationTarget& target,
+                                                   AnchorPlace& hung) {
   if (absl::Status status = CheckReady(); !status.ok()) return status;
   absl::StatusOr<ResolvedTarget> resolved = ResolveTarget(target, frames_, *newest_, options_);
   if (!resolved.ok()) return resolved.status();
   const MapSnapshot& snapshot = newest_->snapshot();
   AnchorPlace place;
-  place.id = next_content_;
+  place.id = next_content_++;
   place.map_generation = snapshot.map_generation;
   place.attached = true;
   place.world_key = snapshot.metric ? options_.world_key : "";
@@ -79,222 +101,145 @@ absl::Status AnchorManager::Place(const AnnotationTarget& target,
         seed_(*view.past.frame, view.world_from_camera, view.pixel, view.depth_m, sigma_m);
     if (feature.ok()) place.seed = *feature;
   }
-  record.place = std::move(place);
-  if (record.annotation.shape == AnnotationShape::kInk && !ink_px.empty()) {
-    record.annotation.ink_offset_m = ProjectInk(ink_px, *resolved);
+  hung = std::move(place);
+  return resolved;
+}
+
+/// A refusal of the other end names its field.
+absl::Status AnchorManager::HangEnd(const AnnotationTarget& target, AnchorRecord& record) {
+  MeasureEnd end;
+  const absl::Status status = Hang(target, end.place).status();
+  if (status.ok()) {
+    record.end = std::move(end);
+    return status;
   }
-  int selections_left = 1;
+  const bool named = absl::StartsWith(status.message(), "target");
+  return absl::Status(status.code(),
+                      absl::StrCat(named ? "end_" : "end_target: ", status.message()));
+}
+
+absl::Status AnchorManager::PlaceDraft(const AnnotationDraft& draft, AnchorRecord& record) {
+  const absl::StatusOr<ResolvedTarget> resolved = Hang(draft.target, record.place);
+  if (!resolved.ok()) return resolved.status();
+  if (draft.shape == AnnotationShape::kInk) {
+    record.annotation.ink_offset_m =
+        draft.ink_px.empty() ? draft.ink_offset_m : InkStroke(ProjectInk(draft.ink_px, *resolved));
+  } else if (draft.shape == AnnotationShape::kMeasure) {
+    const AnnotationTarget end =
+        draft.end_target ? *draft.end_target
+                         : PointTarget{resolved->point_in_world + draft.ink_offset_m[0]};
+    if (absl::Status status = HangEnd(end, record); !status.ok()) return status;
+  }
+  int selections_left = 2;
   Estimate(record, selections_left);
   return absl::OkStatus();
 }
 
 absl::StatusOr<AnnotationEdit> AnchorManager::Create(const AnnotationDraft& draft,
-                                                     const std::string& session_id) {
+                                                     const Editor& editor) {
   if (absl::Status status = CheckDraft(draft); !status.ok()) return status;
-  const Holding added{
-      1, draft.ink_px.size(),
-      draft.text.size() + draft.author.size() + draft.ink_px.size() * sizeof(Eigen::Vector3d)};
-  absl::Status fits = CheckQuotas(records_, options_, session_id, added);
-  if (!fits.ok()) return fits;
   AnchorRecord record;
-  record.annotation.id = MakeUuid();
-  record.annotation.shape = draft.shape;
-  record.annotation.text = draft.text;
-  record.annotation.author = draft.author;
-  record.annotation.size_m = draft.size_m;
-  record.annotation.color_rgba = draft.color_rgba;
-  record.annotation.created_unix_ns = UnixNow();
-  record.annotation.revision = 1;
-  if (absl::Status status = Place(draft.target, draft.ink_px, record); !status.ok()) return status;
-  record.owner = session_id;
+  record.annotation = Drafted(draft, editor);
+  Holding added = HoldingOf(record.annotation);
+  added.ink_points = std::max(draft.ink_px.size(), draft.ink_offset_m.size());
+  added.bytes += added.ink_points * sizeof(Eigen::Vector3d);
+  absl::Status fits = CheckQuotas(records_, options_, editor.person_id, added);
+  if (!fits.ok()) return fits;
+  if (absl::Status status = PlaceDraft(draft, record); !status.ok()) return status;
+  // Not before it is placed: what is refused takes no number.
+  if (draft.shape == AnnotationShape::kPin) record.annotation.number = ++last_pin_;
   record.content_id = next_content_++;
   AnnotationEdit edit =
-      Apply(EditKind::kCreate, session_id, nullptr, &record, /*touches_place=*/true, "created");
+      Apply(EditKind::kCreate, editor, nullptr, &record, /*touches_place=*/true, "created");
   edit.change.request_id = draft.request_id;
   return edit;
 }
 
-absl::StatusOr<AnnotationEdit> AnchorManager::Update(const AnnotationPatch& patch,
-                                                     const std::string& session_id) {
-  if (absl::Status status = CheckPatch(patch); !status.ok()) return status;
-  const AnchorRecord* live = Find(patch.id);
-  if (!live) {
-    return absl::NotFoundError(
-        absl::StrCat("id '", patch.id, "' is no annotation; list them to see which there are"));
-  }
-  AnchorRecord record = *live;
-  if (patch.text) record.annotation.text = *patch.text;
-  if (patch.size_m) record.annotation.size_m = *patch.size_m;
-  if (patch.color_rgba) record.annotation.color_rgba = *patch.color_rgba;
-  if (absl::Status fits = CheckGrowth(live, record.annotation, session_id); !fits.ok()) return fits;
-  if (patch.target) {
-    if (absl::Status status = Place(*patch.target, {}, record); !status.ok()) return status;
-  }
-  record.annotation.revision += 1;
-  record.content_id = next_content_++;
-  return Apply(EditKind::kUpdate, session_id, live, &record,
-               /*touches_place=*/patch.target.has_value(), patch.target ? "moved" : "changed");
-}
-
-absl::StatusOr<AnnotationEdit> AnchorManager::Delete(const std::string& id,
-                                                     const std::string& session_id) {
+absl::StatusOr<const AnchorRecord*> AnchorManager::FindToChange(const std::string& id,
+                                                                const Editor& editor) {
   const AnchorRecord* live = Find(id);
   if (!live) {
     return absl::NotFoundError(
         absl::StrCat("id '", id, "' is no annotation; list them to see which there are"));
   }
-  return Apply(EditKind::kDelete, session_id, live, nullptr, /*touches_place=*/true, "deleted");
+  if (absl::Status may = CheckMayChange(live->annotation, editor); !may.ok()) return may;
+  return live;
 }
 
-/// Whether `wanted` fits into the quotas in place of `live` (null: it is new).
-absl::Status AnchorManager::CheckGrowth(const AnchorRecord* live, const Annotation& wanted,
-                                        const std::string& owner) const {
-  Holding added = HoldingOf(wanted);
-  if (live) {
-    const Holding had = HoldingOf(live->annotation);
-    added.annotations -= had.annotations;
-    added.ink_points -= std::min(added.ink_points, had.ink_points);
-    added.bytes -= std::min(added.bytes, had.bytes);
+absl::StatusOr<AnnotationEdit> AnchorManager::Update(const AnnotationPatch& patch,
+                                                     const Editor& editor) {
+  if (absl::Status status = CheckPatch(patch); !status.ok()) return status;
+  const absl::StatusOr<const AnchorRecord*> live = FindToChange(patch.id, editor);
+  if (!live.ok()) return live.status();
+  AnchorRecord record = **live;
+  Annotation& annotation = record.annotation;
+  if (absl::Status suits = CheckPatchSuits(patch, annotation.shape); !suits.ok()) return suits;
+  const bool turns_lock = patch.locked && *patch.locked != annotation.locked;
+  if (turns_lock) {
+    if (absl::Status may = CheckMayLock(annotation, editor); !may.ok()) return may;
+    annotation.locked = *patch.locked;
+    annotation.locked_by = annotation.locked ? editor.name : "";
   }
-  return CheckQuotas(records_, options_, owner, added);
+  if (patch.text) annotation.text = *patch.text;
+  if (patch.size_m) annotation.size_m = *patch.size_m;
+  if (patch.color_rgba) annotation.color_rgba = *patch.color_rgba;
+  if (patch.world_from_mark) annotation.world_from_mark = patch.world_from_mark;
+  if (patch.extent_m) annotation.extent_m = *patch.extent_m;
+  absl::Status fits = CheckGrowth(*live, annotation, editor.person_id);
+  if (!fits.ok()) return fits;
+  if (patch.target) {
+    const absl::Status hung = Hang(*patch.target, record.place).status();
+    if (!hung.ok()) return hung;
+  }
+  if (patch.end_target) {
+    if (absl::Status hung = HangEnd(*patch.end_target, record); !hung.ok()) return hung;
+  }
+  const bool moved = patch.target || patch.end_target;
+  if (moved) {
+    if (record.end) record.end->told_ns = 0;
+    int selections_left = 2;
+    Estimate(record, selections_left);
+  }
+  annotation.revision += 1;
+  record.content_id = next_content_++;
+  const char* const verb = moved        ? "moved"
+                           : turns_lock ? (*patch.locked ? "locked" : "unlocked")
+                                        : "changed";
+  return Apply(EditKind::kUpdate, editor, *live, &record, /*touches_place=*/moved, verb);
 }
 
-/// A new edit: remembered for undo, and what was undone before can no longer be redone.
-AnnotationEdit AnchorManager::Apply(EditKind kind, const std::string& session_id,
-                                    const AnchorRecord* before, const AnchorRecord* after,
-                                    bool touches_place, const std::string& verb) {
-  const Annotation& annotation = (after ? after : before)->annotation;
-  EditHistory history = histories_.Get(session_id);
-  auto step = std::make_shared<EditStep>();
-  step->id = annotation.id;
-  step->description = absl::StrCat(verb, " ", ShortName(annotation));
-  step->touches_place = touches_place;
-  step->number = next_step_++;
-  if (!touches_place) step->before = LastLeft(history, before);
-  if (!step->before) step->before = Past(before, touches_place);
-  step->after = Past(after, touches_place);
-  history.undone.clear();
-  history.done.push_back(step);
-  return Commit(kind, session_id, step->id, after, std::move(history), step->description);
-}
-
-/// Makes `after` (null: nothing) the live state of `id`.
-AnnotationEdit AnchorManager::Commit(EditKind kind, const std::string& session_id,
-                                     const std::string& id, const AnchorRecord* after,
-                                     EditHistory history, const std::string& description) {
+absl::StatusOr<AnnotationEdit> AnchorManager::Tick(const std::string& id, std::size_t index,
+                                                   bool done, const Editor& editor) {
   const AnchorRecord* live = Find(id);
-  AnnotationEdit edit;
-  edit.change = {next_sequence_++, kind, id, session_id, "", description, std::nullopt};
-  pending_.push_back(
-      {edit.change.sequence, id, Copy(live), session_id, histories_.Get(session_id)});
-  histories_.Set(session_id, std::move(history));
-  if (after) {
-    edit.annotation = after->annotation;
-    edit.change.after = StoredAnnotation{edit.annotation, after->place.world_key};
-  } else {
-    edit.annotation = live->annotation;
-    edit.annotation.anchor.state = AnchorState::kStopped;
-    edit.annotation.anchor.reason = "deleted";
+  if (!live) {
+    return absl::NotFoundError(
+        absl::StrCat("id '", id, "' is no annotation; list them to see which there are"));
   }
-  Put(id, after);
-  Publish();
-  return edit;
-}
-
-absl::StatusOr<AnnotationEdit> AnchorManager::TakeBack(bool undo, const std::string& session_id) {
-  EditHistory history = histories_.Get(session_id);
-  std::vector<EditStepPtr>& from = undo ? history.done : history.undone;
-  std::vector<EditStepPtr>& to = undo ? history.undone : history.done;
-  if (from.empty()) {
-    return absl::FailedPreconditionError(undo ? "this session has nothing to undo"
-                                              : "this session has nothing to redo");
+  if (!live->annotation.check_items) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("id: ", ShortName(live->annotation), " is no check list"));
   }
-  const EditStepPtr step = from.back();
-  from.pop_back();
-  const AnchorRecord* live = Find(step->id);
-  if (!IsUnchanged(live, undo ? step->after : step->before)) {
-    histories_.Set(session_id, std::move(history));
-    return absl::FailedPreconditionError(
-        absl::StrCat("somebody else changed it since you ", step->description,
-                     "; that step is skipped, the one before it is next"));
+  std::vector<CheckItem> items = *live->annotation.check_items;
+  if (index >= items.size()) {
+    return absl::InvalidArgumentError(absl::StrCat("index: ", index, " is beyond the ",
+                                                   items.size(), " lines, which count from 0"));
   }
-  const PastStatePtr& wanted = undo ? step->before : step->after;
-  std::optional<AnchorRecord> restored;
-  if (wanted) {
-    absl::Status fits =
-        CheckGrowth(live, wanted->annotation, wanted->owner == session_id ? session_id : "");
-    if (!fits.ok()) return fits;
-    restored = Restore(*wanted, live);
-  }
-  EditStepPtr turned = step;
-  if (step->touches_place) {  // places move on with the map: these are the ones to come back to
-    auto fresh = std::make_shared<EditStep>(*step);
-    (undo ? fresh->before : fresh->after) = Past(restored ? &*restored : nullptr, true);
-    (undo ? fresh->after : fresh->before) = Past(live, true);
-    turned = std::move(fresh);
-  }
-  to.push_back(std::move(turned));
-  return Commit(undo ? EditKind::kUndo : EditKind::kRedo, session_id, step->id,
-                restored ? &*restored : nullptr, std::move(history),
-                absl::StrCat(undo ? "took back: " : "did again: ", step->description));
-}
-
-/// `past` as a live record, in place of `live` (null: it does not exist any more).
-AnchorRecord AnchorManager::Restore(const PastState& past, const AnchorRecord* live) const {
-  AnchorRecord record = live ? *live : AnchorRecord{};
-  const Anchor anchor = record.annotation.anchor;
-  const std::uint64_t revision = (live ? *live : record).annotation.revision;
-  record.annotation = past.annotation;
-  record.content_id = past.content_id;
-  record.owner = past.owner;
-  if (live) record.annotation.revision = revision;
+  CheckItem& item = items[index];
+  item.done = done;
+  item.done_by = done ? editor.name : "";
+  item.done_unix_ns = done ? UnixNow() : 0;
+  AnchorRecord record = *live;
+  record.annotation.check_items = std::make_shared<const std::vector<CheckItem>>(std::move(items));
   record.annotation.revision += 1;
-  if (live && (!past.place || live->place.id == past.place->id)) {
-    record.annotation.anchor = anchor;  // the place was not part of the edit
-  } else if (past.place) {
-    record.place = *past.place;
-  }
-  int selections_left = 1;
-  if (newest_) Estimate(record, selections_left);
-  return record;
+  record.content_id = next_content_++;
+  return Apply(EditKind::kUpdate, editor, live, &record, /*touches_place=*/false,
+               absl::StrCat(done ? "ticked" : "unticked", " line ", index + 1, " of"));
 }
 
-absl::StatusOr<AnnotationEdit> AnchorManager::Undo(const std::string& session_id) {
-  return TakeBack(true, session_id);
-}
-
-absl::StatusOr<AnnotationEdit> AnchorManager::Redo(const std::string& session_id) {
-  return TakeBack(false, session_id);
-}
-
-void AnchorManager::Put(const std::string& id, const AnchorRecord* record) {
-  AnchorRecord* live = Find(id);
-  if (!record) {
-    if (live) records_.erase(records_.begin() + (live - records_.data()));
-  } else if (live) {
-    *live = *record;
-  } else {
-    const auto later = [record](const AnchorRecord& other) {
-      return CreatedBefore(record->annotation, other.annotation);
-    };
-    records_.insert(std::find_if(records_.begin(), records_.end(), later), *record);
-  }
-}
-
-void AnchorManager::ForgetSession(const std::string& session_id) { histories_.Forget(session_id); }
-
-void AnchorManager::Committed(std::uint64_t sequence) {
-  while (!pending_.empty() && pending_.front().sequence <= sequence) pending_.pop_front();
-}
-
-void AnchorManager::RollBack(std::uint64_t sequence) {
-  while (!pending_.empty() && pending_.back().sequence > sequence) {
-    PendingEdit& edit = pending_.back();
-    Put(edit.id, edit.before.get());
-    histories_.Set(edit.session_id, std::move(edit.history_before));
-    pending_.pop_back();
-  }
-  Publish();
+absl::StatusOr<AnnotationEdit> AnchorManager::Delete(const std::string& id, const Editor& editor) {
+  const absl::StatusOr<const AnchorRecord*> live = FindToChange(id, editor);
+  if (!live.ok()) return live.status();
+  return Apply(EditKind::kDelete, editor, *live, nullptr, /*touches_place=*/true, "deleted");
 }
 
 }  // namespace saccade

@@ -6,6 +6,7 @@
 
 #include "server/anchors/anchor_state.hpp"
 #include "server/anchors/edit_checks.hpp"
+#include "server/anchors/measure.hpp"
 
 namespace saccade {
 namespace {
@@ -15,6 +16,11 @@ constexpr Timestamp kStoreAgainNs = 2'000'000'000;  // at most this often
 // Searching a map of 3000 landmarks takes some 30 us: a thousand anchors that are due at once (all
 // that a restart finds again) take their turns over a second.
 constexpr int kSelectionsPerFrame = 32;
+// A length is told anew when its end moved by a sixth of a pixel, or every so often when it changed
+// at all.
+constexpr double kTellShare = 3e-4;  // of the distance
+constexpr Timestamp kTellAgainNs = 200'000'000;
+constexpr double kTellSigmaShare = 0.1;
 
 }  // namespace
 
@@ -23,11 +29,12 @@ AnchorManager::AnchorManager(AnchorOptions options, FrameLookup frames, SeedFeat
       frames_(std::move(frames)),
       seed_(std::move(seed)),
       histories_({.steps = options_.max_undo,
-                  .bytes_per_session = options_.max_undo_bytes,
+                  .bytes_per_person = options_.max_undo_bytes,
                   .bytes = options_.max_undo_bytes_all}),
       latest_(std::make_shared<const std::vector<Annotation>>()) {}
 
-void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
+void AnchorManager::Load(std::vector<StoredAnnotation> stored, std::uint32_t last_pin) {
+  last_pin_ = std::max(last_pin_, last_pin);
   for (StoredAnnotation& item : stored) {
     AnchorRecord record;
     record.annotation = std::move(item.annotation);
@@ -39,6 +46,14 @@ void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
         DescribeDetached(MapSnapshot{}, options_, record.place, record.annotation.anchor);
     record.stored_point = record.annotation.anchor.point_in_world;
     record.stored_error_m = record.annotation.anchor.error_m;
+    last_pin_ = std::max(last_pin_, record.annotation.number);
+    if (record.annotation.shape == AnnotationShape::kMeasure) {
+      record.end.emplace();
+      record.end->place = record.place;
+      record.end->anchor = record.annotation.anchor;
+      record.end->anchor.point_in_world += record.annotation.ink_offset_m[0];
+      record.end->anchor.covariance_in_world = item.end_covariance_in_world;
+    }
     records_.push_back(std::move(record));
   }
   std::stable_sort(records_.begin(), records_.end(), [](const auto& a, const auto& b) {
@@ -48,10 +63,8 @@ void AnchorManager::Load(std::vector<StoredAnnotation> stored) {
 }
 
 /// A place from another run or an earlier map: found again where the same target gave the world.
-bool AnchorManager::Attach(AnchorRecord& record) const {
+bool AnchorManager::Attach(const Anchor& last, AnchorPlace& place) const {
   const MapSnapshot& snapshot = newest_->snapshot();
-  AnchorPlace& place = record.place;
-  const Anchor& last = record.annotation.anchor;
   const bool same_world = !place.world_key.empty() && place.world_key == options_.world_key;
   if (!same_world || !snapshot.metric || snapshot.status != TrackingStatus::kTracking ||
       !last.point_in_world.allFinite() || !last.covariance_in_world.allFinite()) {
@@ -71,17 +84,52 @@ bool AnchorManager::Attach(AnchorRecord& record) const {
   return true;
 }
 
-void AnchorManager::Estimate(AnchorRecord& record, int& selections_left) const {
+/// Nothing while it does not hang in this map.
+std::optional<PlaceEstimate> AnchorManager::EstimatePlace(AnchorPlace& place, Anchor& anchor,
+                                                          int& selections_left) const {
   const MapSnapshot& snapshot = newest_->snapshot();
-  AnchorPlace& place = record.place;
-  Anchor& anchor = record.annotation.anchor;
   if (place.map_generation != snapshot.map_generation) place.attached = false;
-  if (!place.attached && (selections_left <= 0 || !Attach(record))) {
+  if (!place.attached && (selections_left <= 0 || !Attach(anchor, place))) {
     anchor = DescribeDetached(snapshot, options_, place, anchor);
-    return;
+    return std::nullopt;
   }
-  anchor = DescribeAnchor(*newest_, *camera_, options_,
-                          Follow(*newest_, options_, place, selections_left), place);
+  const PlaceEstimate estimate = Follow(*newest_, options_, place, selections_left);
+  anchor = DescribeAnchor(*newest_, *camera_, options_, estimate, place);
+  return estimate;
+}
+
+void AnchorManager::Estimate(AnchorRecord& record, int& selections_left) const {
+  Anchor& anchor = record.annotation.anchor;
+  const std::optional<PlaceEstimate> at_anchor =
+      EstimatePlace(record.place, anchor, selections_left);
+  if (!record.end) return;
+  const std::optional<PlaceEstimate> at_end =
+      EstimatePlace(record.end->place, record.end->anchor, selections_left);
+  if (at_anchor && at_end) TellLength(*at_anchor, *at_end, record);
+  anchor = JoinEnds(anchor, record.end->anchor);
+}
+
+/// Not with each frame: what is told of a mark, but for its anchor, goes out whole.
+void AnchorManager::TellLength(const PlaceEstimate& at_anchor, const PlaceEstimate& at_end,
+                               AnchorRecord& record) const {
+  Annotation& annotation = record.annotation;
+  MeasureEnd& end = *record.end;
+  const Timestamp now_ns = newest_->snapshot().capture_time_ns;
+  const Measured measured = MeasureBetween(*newest_, record.place, at_anchor, end.place, at_end);
+  if (end.told_ns != 0 && !annotation.ink_offset_m.empty()) {
+    const double moved_m = (measured.offset_in_world - annotation.ink_offset_m[0]).norm();
+    const double limit_m = kTellShare * std::min(record.place.distance_m, end.place.distance_m);
+    const double sigma_m = std::max(measured.sigma_m, annotation.length_sigma_m);
+    const bool differs =
+        moved_m > 0.1 * limit_m ||
+        std::abs(measured.sigma_m - annotation.length_sigma_m) > kTellSigmaShare * sigma_m;
+    const bool due = std::abs(now_ns - end.told_ns) >= kTellAgainNs;
+    if (moved_m <= limit_m && !(due && differs)) return;
+  }
+  end.told_ns = now_ns;
+  annotation.ink_offset_m = InkStroke({measured.offset_in_world});
+  annotation.length_m = measured.length_m;
+  annotation.length_sigma_m = measured.sigma_m;
 }
 
 std::optional<AnchorMoved> AnchorManager::ResolveOne(bool map_corrected, AnchorRecord& record,
@@ -108,10 +156,10 @@ std::vector<AnchorMoved> AnchorManager::Resolve(std::shared_ptr<const MapSnapsho
   int selections_left = kSelectionsPerFrame;
   bool looked = false;
   for (AnchorRecord& record : records_) {
-    AnchorPlace& place = record.place;
-    if (!looked && place.look) {
-      const double age_s = Seconds(newest_->snapshot().capture_time_ns - place.placed_ns);
-      looked = LookAgain(frames_, &trail_, newest_->snapshot(), age_s, place.look, place.doubt);
+    for (AnchorPlace* place : {&record.place, record.end ? &record.end->place : nullptr}) {
+      if (looked || !place || !place->look) continue;
+      const double age_s = Seconds(newest_->snapshot().capture_time_ns - place->placed_ns);
+      looked = LookAgain(frames_, &trail_, newest_->snapshot(), age_s, place->look, place->doubt);
     }
     if (std::optional<AnchorMoved> jump = ResolveOne(corrected, record, selections_left)) {
       moved.push_back(std::move(*jump));
@@ -145,9 +193,8 @@ std::vector<AnnotationChange> AnchorManager::TakeRefinements() {
     record.stored_time_ns = now_ns;
     record.stored_point = anchor.point_in_world;
     record.stored_error_m = anchor.error_m;
-    changes.push_back({next_sequence_++, EditKind::kRefine, record.annotation.id, "", "",
-                       "refined " + ShortName(record.annotation),
-                       StoredAnnotation{record.annotation, record.place.world_key}});
+    changes.push_back({next_sequence_++, EditKind::kRefine, record.annotation.id, "", "", "",
+                       "refined " + ShortName(record.annotation), Stored(record)});
   }
   return changes;
 }

@@ -35,6 +35,13 @@ using SeedFeatureFunction = std::function<absl::StatusOr<FeatureId>(
 struct AnnotationEdit {
   Annotation annotation;  // after the edit; state STOPPED if it was deleted
   AnnotationChange change;
+  std::vector<AnnotationChange> with;  // made before it, to be kept together with it or not at all
+  std::string description;             // of all, in words
+
+  /// Of the first of its changes.
+  std::uint64_t first_sequence() const {
+    return with.empty() ? change.sequence : with.front().sequence;
+  }
 };
 
 /// Annotations bound to the map: the one owner, on the tracker thread. Readers take Latest().
@@ -46,7 +53,8 @@ class AnchorManager {
 
   /// Takes over what the store holds, before the first Resolve. All of it is paused until its place
   /// in the map is known.
-  void Load(std::vector<StoredAnnotation> stored);
+  /// `last_pin`: the highest number that a pin ever had; none is given again.
+  void Load(std::vector<StoredAnnotation> stored, std::uint32_t last_pin = 0);
 
   /// Says whether `id` exists now; nothing otherwise.
   std::optional<Annotation> Get(const std::string& id) const;
@@ -57,18 +65,24 @@ class AnchorManager {
   ///   NotFound            frame too old or unknown; unknown feature
   ///   FailedPrecondition  not tracking in that frame; map was reset since; no depth known yet
   ///   ResourceExhausted   a quota of the options is reached; says which, and what to do
-  absl::StatusOr<AnnotationEdit> Create(const AnnotationDraft& draft,
-                                        const std::string& session_id);
-  /// As Create; NotFound for an unknown id.
-  absl::StatusOr<AnnotationEdit> Update(const AnnotationPatch& patch,
-                                        const std::string& session_id);
-  absl::StatusOr<AnnotationEdit> Delete(const std::string& id, const std::string& session_id);
+  ///   PermissionDenied   it is locked, and not by or for this editor; says by whom
+  absl::StatusOr<AnnotationEdit> Create(const AnnotationDraft& draft, const Editor& editor);
+  /// As Create; NotFound for an unknown id. A measure whose `target` alone is set keeps its other
+  /// end.
+  absl::StatusOr<AnnotationEdit> Update(const AnnotationPatch& patch, const Editor& editor);
+  absl::StatusOr<AnnotationEdit> Delete(const std::string& id, const Editor& editor);
+  /// Ticks a line of a check list off, or on again; locked or not. InvalidArgument: there is no
+  /// such line.
+  absl::StatusOr<AnnotationEdit> Tick(const std::string& id, std::size_t index, bool done,
+                                      const Editor& editor);
 
-  /// Takes back, or does again, the last change made by this session. FailedPrecondition if there
-  /// is none, or if somebody else changed that annotation since (that step is then dropped);
-  /// ResourceExhausted if what it brings back does not fit into the quotas now.
-  absl::StatusOr<AnnotationEdit> Undo(const std::string& session_id);
-  absl::StatusOr<AnnotationEdit> Redo(const std::string& session_id);
+  /// Takes back, or does again, the last change made by this person, in whichever session, or the
+  /// last ones that were made together (Editor::edit_group). FailedPrecondition if there is none,
+  /// or if somebody else changed that annotation since (that step is then dropped; of several, the
+  /// others are taken back); ResourceExhausted if what it brings back does not fit into the quotas
+  /// now; PermissionDenied if somebody locked it.
+  absl::StatusOr<AnnotationEdit> Undo(const Editor& editor);
+  absl::StatusOr<AnnotationEdit> Redo(const Editor& editor);
 
   /// Once per frame: recomputes every anchor from the newest map and publishes. Returns the jumps.
   std::vector<AnchorMoved> Resolve(std::shared_ptr<const MapSnapshot> snapshot,
@@ -78,38 +92,47 @@ class AnchorManager {
   /// twice as sure since last stored); at most one in two seconds each. Not part of any undo.
   std::vector<AnnotationChange> TakeRefinements();
 
-  /// The session ended: what it did can no longer be undone.
-  void ForgetSession(const std::string& session_id);
+  /// The person cannot come back: what they did can no longer be undone.
+  void ForgetPerson(const std::string& person_id);
 
   /// Everything up to `sequence` is on disk.
   void Committed(std::uint64_t sequence);
   /// Takes back every change after `sequence`, newest first: the store could not keep them.
   void RollBack(std::uint64_t sequence);
 
-  /// Memory that undo holds, over all sessions [bytes].
+  /// Memory that undo holds, over all persons [bytes].
   std::size_t undo_bytes() const { return histories_.bytes(); }
 
   /// All annotations as of the last Resolve or edit, oldest first; never null. Any thread.
   std::shared_ptr<const std::vector<Annotation>> Latest() const;
 
  private:
-  AnnotationEdit Apply(EditKind kind, const std::string& session_id, const AnchorRecord* before,
+  AnnotationEdit Apply(EditKind kind, const Editor& editor, const AnchorRecord* before,
                        const AnchorRecord* after, bool touches_place, const std::string& verb);
-  AnnotationEdit Commit(EditKind kind, const std::string& session_id, const std::string& id,
+  AnnotationEdit Commit(EditKind kind, const Editor& editor, const std::string& id,
                         const AnchorRecord* after, EditHistory history,
                         const std::string& description);
-  absl::StatusOr<AnnotationEdit> TakeBack(bool undo, const std::string& session_id);
+  absl::StatusOr<AnnotationEdit> TakeBack(bool undo, const Editor& editor);
+  absl::StatusOr<AnnotationEdit> TakeBackStep(bool undo, const EditStepPtr& step,
+                                              const Editor& editor);
   AnchorRecord Restore(const PastState& past, const AnchorRecord* live) const;
+  static StoredAnnotation Stored(const AnchorRecord& record);
   absl::Status CheckGrowth(const AnchorRecord* live, const Annotation& wanted,
-                           const std::string& owner) const;
-  absl::Status Place(const AnnotationTarget& target, const std::vector<Eigen::Vector2d>& ink_px,
-                     AnchorRecord& record);
+                           const std::string& person_id) const;
+  absl::StatusOr<ResolvedTarget> Hang(const AnnotationTarget& target, AnchorPlace& hung);
+  absl::Status HangEnd(const AnnotationTarget& target, AnchorRecord& record);
+  absl::Status PlaceDraft(const AnnotationDraft& draft, AnchorRecord& record);
+  absl::StatusOr<const AnchorRecord*> FindToChange(const std::string& id, const Editor& editor);
   void Put(const std::string& id, const AnchorRecord* record);
   AnchorRecord* Find(const std::string& id);
   absl::Status CheckReady() const;
-  bool Attach(AnchorRecord& record) const;
+  bool Attach(const Anchor& last, AnchorPlace& place) const;
   /// `selections_left`: see Follow. Attaching a place counts as one too.
   void Estimate(AnchorRecord& record, int& selections_left) const;
+  std::optional<PlaceEstimate> EstimatePlace(AnchorPlace& place, Anchor& anchor,
+                                             int& selections_left) const;
+  void TellLength(const PlaceEstimate& at_anchor, const PlaceEstimate& at_end,
+                  AnchorRecord& record) const;
   std::optional<AnchorMoved> ResolveOne(bool map_corrected, AnchorRecord& record,
                                         int& selections_left) const;
   void Publish();
@@ -127,6 +150,7 @@ class AnchorManager {
   std::uint64_t next_sequence_ = 1;
   std::uint64_t next_content_ = 1;
   std::uint64_t next_step_ = 1;
+  std::uint32_t last_pin_ = 0;
 
   mutable std::mutex latest_mutex_;
   std::shared_ptr<const std::vector<Annotation>> latest_;

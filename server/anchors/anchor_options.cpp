@@ -34,6 +34,8 @@ absl::Status AnchorOptions::Validate() const {
                                      some("max_bytes", max_bytes),
                                      some("max_session_annotations", max_session_annotations),
                                      some("max_session_ink_points", max_session_ink_points),
+                                     some("max_picture_bytes", max_picture_bytes),
+                                     some("max_person_picture_bytes", max_person_picture_bytes),
                                      some("max_undo_bytes", max_undo_bytes),
                                      some("max_undo_bytes_all", max_undo_bytes_all),
                                      positive("cluster_softening_m", cluster_softening_m),

@@ -34,16 +34,18 @@ struct AnchorOptions {
   // text 500 bytes: edit_checks.)
   std::size_t max_annotations = 1000;
   std::size_t max_ink_points = 240'000;
-  std::size_t max_bytes = 6'000'000;  // of texts, names and strokes (24 bytes a point)
-  // What one session made and still stands: nobody alone shuts the others out.
+  std::size_t max_bytes = 6'000'000;         // of texts, names and strokes (24 bytes a point)
+  std::size_t max_picture_bytes = 64 << 20;  // of the files of pictures, which memory holds
+  // What one person made and still stands: nobody alone shuts the others out.
   std::size_t max_session_annotations = 750;
   std::size_t max_session_ink_points = 180'000;
+  std::size_t max_person_picture_bytes = 32 << 20;
   // What can be undone; the oldest step goes first. A recolouring takes 1 kB, a deleted stroke up
-  // to 50 kB: 4 MiB are a hundred steps of anything but the longest strokes, and the sum keeps a
-  // thousand sessions from holding gigabytes.
-  std::size_t max_undo = 100;                 // steps of one session
-  std::size_t max_undo_bytes = 4 << 20;       // of one session
-  std::size_t max_undo_bytes_all = 64 << 20;  // of all sessions together
+  // to 50 kB, a picture up to 1 MiB: 4 MiB are a hundred steps of anything but those, and the sum
+  // keeps a thousand persons from holding gigabytes.
+  std::size_t max_undo = 100;                 // steps of one person
+  std::size_t max_undo_bytes = 4 << 20;       // of one person
+  std::size_t max_undo_bytes_all = 64 << 20;  // of all persons together
   /// What makes world the same world after a restart: WorldKey(target). Empty: nothing does, and
   /// stored annotations stay paused.
   std::string world_key;

@@ -45,7 +45,7 @@ absl::StatusOr<std::unique_ptr<AnnotationBook>> AnnotationBook::Open(
   for (AnsweredRequest& request : stored->requests) {
     book->Keep(request.request_id, {std::move(request.annotation_id), 0});
   }
-  book->anchors_.Load(std::move(stored->annotations));
+  book->anchors_.Load(std::move(stored->annotations), stored->last_pin);
   return book;
 }
 
@@ -109,68 +109,77 @@ bool AnnotationBook::AnswerAgain(const std::string& request_id, const Annotation
 }
 
 void AnnotationBook::Commit(AnnotationEdit edit, AnnotationDone done) {
-  const std::uint64_t sequence = edit.change.sequence;
+  const std::uint64_t sequence = edit.change.sequence, first = edit.first_sequence();
   if (!store_) {
     anchors_.Committed(sequence);
     done(edit.annotation);
     return;
   }
-  const absl::Status queued = store_->Submit(
-      std::move(edit.change),
+  std::vector<AnnotationChange> changes = std::move(edit.with);
+  changes.push_back(std::move(edit.change));
+  const absl::Status queued = store_->SubmitAll(
+      std::move(changes),
       [done, answer = std::move(edit.annotation), owed = owed_](const absl::Status& status) {
         if (status.ok()) return done(answer);
         owed->Add([done, status] { done(status); });
       });
   if (queued.ok()) return;
-  anchors_.RollBack(sequence - 1);
+  anchors_.RollBack(first - 1);
   absl::erase_if(requests_,
                  [sequence](const auto& request) { return request.second.sequence == sequence; });
   Settle();
   done(queued);
 }
 
-void AnnotationBook::Create(const AnnotationDraft& draft, const std::string& session_id,
+void AnnotationBook::Create(const AnnotationDraft& draft, const Editor& editor,
                             AnnotationDone done) {
   Settle();
   if (AnswerAgain(draft.request_id, done)) return;
-  absl::StatusOr<AnnotationEdit> edit = anchors_.Create(draft, session_id);
+  absl::StatusOr<AnnotationEdit> edit = anchors_.Create(draft, editor);
   if (!edit.ok()) return done(edit.status());
   Keep(draft.request_id, {edit->change.id, edit->change.sequence});
   Commit(*std::move(edit), std::move(done));
 }
 
-void AnnotationBook::Update(const AnnotationPatch& patch, const std::string& session_id,
+void AnnotationBook::Update(const AnnotationPatch& patch, const Editor& editor,
                             AnnotationDone done) {
   Settle();
-  absl::StatusOr<AnnotationEdit> edit = anchors_.Update(patch, session_id);
+  absl::StatusOr<AnnotationEdit> edit = anchors_.Update(patch, editor);
   if (!edit.ok()) return done(edit.status());
   Commit(*std::move(edit), std::move(done));
 }
 
-void AnnotationBook::Delete(const std::string& id, const std::string& session_id,
-                            AnnotationDone done) {
+void AnnotationBook::Delete(const std::string& id, const Editor& editor, AnnotationDone done) {
   Settle();
-  absl::StatusOr<AnnotationEdit> edit = anchors_.Delete(id, session_id);
+  absl::StatusOr<AnnotationEdit> edit = anchors_.Delete(id, editor);
+  if (!edit.ok()) return done(edit.status());
+  Commit(*std::move(edit), std::move(done));
+}
+
+void AnnotationBook::Tick(const std::string& id, std::size_t index, bool ticked,
+                          const Editor& editor, AnnotationDone done) {
+  Settle();
+  absl::StatusOr<AnnotationEdit> edit = anchors_.Tick(id, index, ticked, editor);
   if (!edit.ok()) return done(edit.status());
   Commit(*std::move(edit), std::move(done));
 }
 
 void AnnotationBook::TakeBack(absl::StatusOr<AnnotationEdit> edit, DescriptionDone done) {
   if (!edit.ok()) return done(edit.status());
-  const std::string description = edit->change.description;
+  const std::string description = edit->description;
   Commit(*std::move(edit), [done, description](const absl::StatusOr<Annotation>& annotation) {
     annotation.ok() ? done(description) : done(annotation.status());
   });
 }
 
-void AnnotationBook::Undo(const std::string& session_id, DescriptionDone done) {
+void AnnotationBook::Undo(const Editor& editor, DescriptionDone done) {
   Settle();
-  TakeBack(anchors_.Undo(session_id), std::move(done));
+  TakeBack(anchors_.Undo(editor), std::move(done));
 }
 
-void AnnotationBook::Redo(const std::string& session_id, DescriptionDone done) {
+void AnnotationBook::Redo(const Editor& editor, DescriptionDone done) {
   Settle();
-  TakeBack(anchors_.Redo(session_id), std::move(done));
+  TakeBack(anchors_.Redo(editor), std::move(done));
 }
 
 std::vector<AnchorMoved> AnnotationBook::OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,

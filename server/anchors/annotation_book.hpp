@@ -35,12 +35,14 @@ class AnnotationBook {
   ~AnnotationBook();
 
   /// A draft whose request id was answered before is answered with that annotation again.
-  void Create(const AnnotationDraft& draft, const std::string& session_id, AnnotationDone done);
-  void Update(const AnnotationPatch& patch, const std::string& session_id, AnnotationDone done);
-  void Delete(const std::string& id, const std::string& session_id, AnnotationDone done);
+  void Create(const AnnotationDraft& draft, const Editor& editor, AnnotationDone done);
+  void Update(const AnnotationPatch& patch, const Editor& editor, AnnotationDone done);
+  void Delete(const std::string& id, const Editor& editor, AnnotationDone done);
+  void Tick(const std::string& id, std::size_t index, bool ticked, const Editor& editor,
+            AnnotationDone done);
   /// The description says what was done, e.g. "deleted cube 6f1c...".
-  void Undo(const std::string& session_id, DescriptionDone done);
-  void Redo(const std::string& session_id, DescriptionDone done);
+  void Undo(const Editor& editor, DescriptionDone done);
+  void Redo(const Editor& editor, DescriptionDone done);
 
   /// Once per frame, after the tracker: settles commits, recomputes anchors, publishes. Returns the
   /// jumps.
@@ -57,7 +59,7 @@ class AnnotationBook {
   }
 
   /// The session ended: what it did can no longer be undone.
-  void ForgetSession(const std::string& session_id) { anchors_.ForgetSession(session_id); }
+  void ForgetPerson(const std::string& person_id) { anchors_.ForgetPerson(person_id); }
 
   /// All annotations, oldest first; never null. Any thread.
   std::shared_ptr<const std::vector<Annotation>> Latest() const { return anchors_.Latest(); }

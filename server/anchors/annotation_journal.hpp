@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/anchors/stored_annotation.hpp"
@@ -22,6 +23,7 @@ struct AnsweredRequest {
 struct StoredAnnotations {
   std::vector<StoredAnnotation> annotations;  // oldest first
   std::vector<AnsweredRequest> requests;      // the last 10 000, oldest first
+  std::uint32_t last_pin = 0;                 // the highest number that a pin ever had
 };
 
 /// Where changes of annotations are made durable: what AnnotationBook needs of a store
@@ -40,12 +42,18 @@ class AnnotationJournal {
   /// All that is kept. DataLoss names the row that cannot be read.
   virtual absl::StatusOr<StoredAnnotations> LoadAll() = 0;
 
-  /// Queues a change; never blocks. `done` (may be null) is not called if this fails:
+  /// Queues changes that are kept together or not at all; never blocks. `done` (may be null) is not
+  /// called if this fails:
   ///   ResourceExhausted   queue full
   ///   the last error      a commit failed and Resume() has not been called yet
-  virtual absl::Status Submit(AnnotationChange change, Done done) = 0;
-  /// As Submit, without a change: `done` is called once all that was queued before is kept, or with
-  /// the error that hit it.
+  virtual absl::Status SubmitAll(std::vector<AnnotationChange> changes, Done done) = 0;
+  absl::Status Submit(AnnotationChange change, Done done) {
+    std::vector<AnnotationChange> changes;
+    changes.push_back(std::move(change));
+    return SubmitAll(std::move(changes), std::move(done));
+  }
+  /// As SubmitAll, without a change: `done` is called once all that was queued before is kept, or
+  /// with the error that hit it.
   virtual absl::Status SubmitBarrier(Done done) = 0;
 
   /// Sequence number of the last change that is kept; 0 if none in this run. Any thread.

@@ -116,37 +116,28 @@ Rigid3 RayFromWorld(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray_in
 }
 
 absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const FrameLookup& frames,
-                                            const MapView& newest, const AnchorOptions& options) {
-  if (!target.pixel.allFinite()) return CheckPixel(target, CameraModel());
-  absl::StatusOr<PastFrame> past = frames(target.frame_id);
-  if (!past.ok()) return past.status();
-  const CameraModel& camera = *past->frame->camera;
-  if (absl::Status status = CheckPixel(target, camera); !status.ok()) return status;
-  if (absl::Status status = CheckFrame(*past, newest.snapshot()); !status.ok()) return status;
-  const std::optional<Eigen::Vector3d> bearing = camera.Unproject(target.pixel);
-  if (!bearing) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "target.frame_pixel.pixel (%.1f, %.1f) lies where the lens model cannot be inverted; click "
-        "nearer to the middle of the picture",
-        target.pixel.x(), target.pixel.y()));
-  }
-  const MapSnapshot& then = *past->snapshot;
-  const Rigid3 newest_from_past =
-      NewestFromPast(then, newest, then.world_from_camera.rotation * *bearing);
-  const Rigid3 world_from_camera = newest_from_past * then.world_from_camera;
-  const Eigen::Vector3d ray = (world_from_camera.rotation * *bearing).normalized();
+                                            const MapView& newest, const AnchorOptions& options,
+                                            ClickCare care) {
+  absl::StatusOr<PixelRay> cast = CastPixel(target, frames, newest);
+  if (!cast.ok()) return cast.status();
+  const MapSnapshot& then = *cast->past.snapshot;
+  const CameraModel& camera = *cast->past.frame->camera;
+  const Rigid3& world_from_camera = cast->world_from_camera;
+  const Eigen::Vector3d& ray = cast->ray_in_world;
   const Rigid3 ray_from_world = RayFromWorld(world_from_camera.translation, ray);
 
   std::vector<FeatureId> ids;
   const std::vector<SurfaceSample> samples =
-      VisibleSamples(then, newest, newest_from_past, ray_from_world, ids);
+      VisibleSamples(then, newest, cast->newest_from_past, ray_from_world, ids);
   std::optional<SurfaceDepth> depth =
       EstimateDepth(samples, camera.RadiansPerPixel(), newest.snapshot().metric, options);
   if (!depth) return NoDepth();
 
   ResolvedTarget resolved;
-  resolved.doubt = AskThePicture(*past, target.pixel, newest.snapshot().frame_id, frames,
-                                 newest.trail(), *depth);
+  if (care == ClickCare::kFull) {
+    resolved.doubt = AskThePicture(cast->past, target.pixel, newest.snapshot().frame_id, frames,
+                                   newest.trail(), *depth);
+  }
   resolved.method = depth->method;
   resolved.distance_m = depth->depth_m;
   resolved.point_in_world = world_from_camera.translation + depth->depth_m * ray;
@@ -160,10 +151,9 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
   if (depth->at_feature && newest.Find(ids[*depth->at_feature])) {
     resolved.feature = ids[*depth->at_feature];
   }
-  resolved.view = ResolvedTarget::View{
-      *std::move(past), world_from_camera,
-      target.pixel,     depth->depth_m,
-      depth->sigma_m,   ray_from_world.rotation.conjugate() * depth->normal_in_ray};
+  resolved.normal_in_world = ray_from_world.rotation.conjugate() * depth->normal_in_ray;
+  resolved.view = ResolvedTarget::View{std::move(cast->past), world_from_camera, target.pixel,
+                                       depth->depth_m, depth->sigma_m};
   return resolved;
 }
 
@@ -227,10 +217,35 @@ absl::StatusOr<ResolvedTarget> ResolveRay(const RayTarget& target, const MapView
   resolved.covariance_in_world = AlongAndAcross(
       ray, depth->sigma_m, options.click_sigma_px * kRayRadiansPerPx * depth->depth_m);
   if (depth->at_feature) resolved.feature = ids[*depth->at_feature];
+  resolved.normal_in_world = ray_from_world.rotation.conjugate() * depth->normal_in_ray;
   return resolved;
 }
 
 }  // namespace
+
+absl::StatusOr<PixelRay> CastPixel(const PixelTarget& target, const FrameLookup& frames,
+                                   const MapView& newest) {
+  if (!target.pixel.allFinite()) return CheckPixel(target, CameraModel());
+  absl::StatusOr<PastFrame> past = frames(target.frame_id);
+  if (!past.ok()) return past.status();
+  const CameraModel& camera = *past->frame->camera;
+  if (absl::Status status = CheckPixel(target, camera); !status.ok()) return status;
+  if (absl::Status status = CheckFrame(*past, newest.snapshot()); !status.ok()) return status;
+  const std::optional<Eigen::Vector3d> bearing = camera.Unproject(target.pixel);
+  if (!bearing) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "target.frame_pixel.pixel (%.1f, %.1f) lies where the lens model cannot be inverted; click "
+        "nearer to the middle of the picture",
+        target.pixel.x(), target.pixel.y()));
+  }
+  PixelRay cast;
+  const MapSnapshot& then = *past->snapshot;
+  cast.newest_from_past = NewestFromPast(then, newest, then.world_from_camera.rotation * *bearing);
+  cast.world_from_camera = cast.newest_from_past * then.world_from_camera;
+  cast.ray_in_world = (cast.world_from_camera.rotation * *bearing).normalized();
+  cast.past = *std::move(past);
+  return cast;
+}
 
 Rigid3 NewestFromPast(const MapSnapshot& before, const MapView& newest,
                       const Eigen::Vector3d& ray_in_world) {
@@ -252,10 +267,10 @@ Rigid3 NewestFromPast(const MapSnapshot& before, const MapView& newest,
 
 absl::StatusOr<ResolvedTarget> ResolveTarget(const AnnotationTarget& target,
                                              const FrameLookup& frames, const MapView& newest,
-                                             const AnchorOptions& options) {
+                                             const AnchorOptions& options, ClickCare care) {
   absl::StatusOr<ResolvedTarget> resolved;
   if (const auto* pixel = std::get_if<PixelTarget>(&target)) {
-    return ResolvePixel(*pixel, frames, newest, options);
+    return ResolvePixel(*pixel, frames, newest, options, care);
   }
   if (const auto* feature = std::get_if<FeatureTarget>(&target)) {
     resolved = ResolveFeature(*feature, newest);
@@ -268,25 +283,6 @@ absl::StatusOr<ResolvedTarget> ResolveTarget(const AnnotationTarget& target,
   const Eigen::Vector3d camera = newest.snapshot().world_from_camera.translation;
   resolved->distance_m = std::max(1e-3, (resolved->point_in_world - camera).norm());
   return resolved;
-}
-
-std::vector<Eigen::Vector3d> ProjectInk(const std::vector<Eigen::Vector2d>& ink_px,
-                                        const ResolvedTarget& target) {
-  std::vector<Eigen::Vector3d> offsets;
-  if (!target.view) return offsets;
-  const ResolvedTarget::View& view = *target.view;
-  const Eigen::Vector3d origin = view.world_from_camera.translation;
-  for (const Eigen::Vector2d& pixel : ink_px) {
-    const std::optional<Eigen::Vector3d> bearing = view.past.frame->camera->Unproject(pixel);
-    if (!bearing) continue;
-    const Eigen::Vector3d ray = view.world_from_camera.rotation * *bearing;
-    const double cosine = ray.dot(view.normal_in_world);
-    double t = (target.point_in_world - origin).dot(view.normal_in_world) / cosine;
-    const bool hits = std::abs(cosine) > 0.1 && t > 0.5 * view.depth_m && t < 2.0 * view.depth_m;
-    if (!hits) t = view.depth_m;
-    offsets.push_back(origin + t * ray - target.point_in_world);
-  }
-  return offsets;
 }
 
 }  // namespace saccade

@@ -12,6 +12,14 @@ namespace saccade {
 /// they are resolved.
 absl::Status CheckDraft(const AnnotationDraft& draft);
 absl::Status CheckPatch(const AnnotationPatch& patch);
+/// The same, if the patch changes what that shape does not have.
+absl::Status CheckPatchSuits(const AnnotationPatch& patch, AnnotationShape shape);
+
+bool IsAuthorOrWearer(const Annotation& annotation, const Editor& editor);
+/// PermissionDenied, saying who locked it, unless the editor may change, delete and unlock it.
+absl::Status CheckMayChange(const Annotation& annotation, const Editor& editor);
+/// PermissionDenied unless the editor may lock and unlock it.
+absl::Status CheckMayLock(const Annotation& annotation, const Editor& editor);
 
 /// A random UUID (version 4).
 std::string MakeUuid();

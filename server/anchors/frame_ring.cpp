@@ -22,6 +22,7 @@ std::size_t Bytes(const PastFrame& past) {
 }  // namespace
 
 PastFrame FrameRing::Packed::Unpack(Want want) const {
+  if (want == Want::kPose) return {std::make_shared<const Frame>(frame.head), snapshot.Unpack()};
   return {saccade::Unpack(frame, want == Want::kAll), snapshot.Unpack()};
 }
 
@@ -147,7 +148,7 @@ absl::StatusOr<FrameRing::Entry> FrameRing::Locate(FrameId id) const {
 absl::StatusOr<PastFrame> FrameRing::Find(FrameId id, Want want) const {
   const absl::StatusOr<Entry> entry = Locate(id);
   if (!entry.ok()) return entry.status();
-  if (!entry->packed && !entry->old) return entry->whole;
+  if (!entry->packed && (!entry->old || want == Want::kPose)) return entry->whole;
   try {
     // What the packer has not come to yet is answered as it will be: nothing depends on timing.
     const auto packed = entry->packed ? entry->packed : PackOne(entry->whole, nullptr);

@@ -44,7 +44,7 @@ class FrameRing {
     std::size_t max_held = 16;
     std::size_t max_unpacked = 4;  // the newest frames, which most ask for
   };
-  enum class Want { kAll, kGrey };
+  enum class Want { kAll, kGrey, kPose };  // kPose: a picture only where it costs nothing
 
   FrameRing() = default;
   explicit FrameRing(const Options& options) : options_(options) {}
@@ -55,7 +55,8 @@ class FrameRing {
   void Push(PastFrame past);
 
   /// NotFound: the id is too old, was dropped, or has not been captured yet; the message says
-  /// which. Unpacking takes 1 ms, 3 ms with colour (640x480).
+  /// which. Unpacking takes 1 ms, 3 ms with colour (640x480), little without
+  /// a picture.
   absl::StatusOr<PastFrame> Find(FrameId id, Want want = Want::kAll) const;
 
   /// The newest frame, or NotFound before the first.

@@ -16,13 +16,14 @@ struct Holding {
   std::size_t annotations = 0;
   std::size_t ink_points = 0;
   std::size_t bytes = 0;  // of texts, names and strokes
+  std::size_t picture_bytes = 0;
 };
 Holding HoldingOf(const Annotation& annotation);
 
-/// ResourceExhausted if `owner` (empty: no session's) may not add so much to `records`: it says
+/// ResourceExhausted if `person_id` (empty: nobody's) may not add so much to `records`: it says
 /// which quota, how much there is and what to do. What does not grow is not held against anybody,
 /// so that a store which is above a quota already (an older data base) can still be edited.
 absl::Status CheckQuotas(const std::vector<AnchorRecord>& records, const AnchorOptions& options,
-                         const std::string& owner, const Holding& added);
+                         const std::string& person_id, const Holding& added);
 
 }  // namespace saccade

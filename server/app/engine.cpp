@@ -98,6 +98,7 @@ void Engine::Stop() {
     if (thread->joinable()) thread->join();
   }
   stills_.Stop();
+  gallery_.Stop();
   for (const auto& view : views_) view->Stop();
   wearable_->Close();  // commits what is queued and answers it
 }
@@ -232,6 +233,24 @@ std::shared_ptr<const AnnotationList> Engine::annotations() const {
   return wearable_->annotations();
 }
 
+absl::StatusOr<std::vector<Eigen::Vector3d>> Engine::LocatePointer(
+    absl::Span<const AnnotationTarget> points, std::optional<StrokeSurface>* surface) {
+  const PointerPlacer& placer = wearable_->pointers();
+  return surface == nullptr ? placer.Locate(points) : placer.Trace(points, *surface);
+}
+
+void Engine::SetPointers(std::shared_ptr<const PointerList> pointers) {
+  {
+    const std::lock_guard lock(pointers_mutex_);
+    pointers_ = std::move(pointers);
+  }
+  views_[static_cast<std::size_t>(VideoView::kAugmented)]->RedrawNewest();
+}
+
+void Engine::ReadPicture(std::string bytes, Done<PicturePtr> done) {
+  gallery_.Read(std::move(bytes), std::move(done));
+}
+
 void Engine::SetPresence(std::shared_ptr<const ParticipantSet> present) {
   if (gaze_) gaze_->SetPresence(std::move(present));
 }
@@ -283,6 +302,11 @@ cv::Mat Engine::DrawAugmented(const TrackedFrame& frame) const {
     } else if (const auto* annotation = std::get_if<GazeAnnotation>(&*state->target)) {
       overlay.fixated_annotation = annotation->id;
     }
+  }
+  overlay.picture = [this](const PicturePtr& one) { return gallery_.Find(one); };
+  {
+    const std::lock_guard lock(pointers_mutex_);
+    overlay.pointers = pointers_;
   }
   cv::Mat picture =
       Augment(*frame.frame, *frame.tracked.snapshot, *frame.tracked.annotations, overlay);

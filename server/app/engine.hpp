@@ -6,11 +6,13 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <thread>
 
 #include "server/app/frame_clock.hpp"
 #include "server/app/gaze_runner.hpp"
+#include "server/app/picture_gallery.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/capture/frame_source.hpp"
 #include "server/overlay/overlay.hpp"
@@ -66,6 +68,10 @@ class Engine : public Backend {
   std::shared_ptr<const GazeSnapshot> gaze() const override;
   absl::Status SubmitGaze(GazeCommand command) override;
   void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) override;
+  absl::StatusOr<std::vector<Eigen::Vector3d>> LocatePointer(
+      absl::Span<const AnnotationTarget> points, std::optional<StrokeSurface>* surface) override;
+  void SetPointers(std::shared_ptr<const PointerList> pointers) override;
+  void ReadPicture(std::string bytes, Done<PicturePtr> done) override;
   void SetPresence(std::shared_ptr<const ParticipantSet> present) override;
   void SetVideoDemand(VideoView view, bool wanted) override;
   void RequestKeyFrame(VideoView view) override;
@@ -117,6 +123,10 @@ class Engine : public Backend {
   std::atomic<Timestamp> tracked_ns_ = 0;  // when a frame last came
 
   std::unique_ptr<GazeRunner> gaze_;  // null: no mount
+
+  mutable PictureGallery gallery_;
+  mutable std::mutex pointers_mutex_;
+  std::shared_ptr<const PointerList> pointers_;  // null: none so far
 
   Runner<StillRequest> stills_;
   std::jthread source_thread_, tracker_thread_, clock_thread_;

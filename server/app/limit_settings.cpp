@@ -23,7 +23,7 @@ const OptionTable<LimitSettings>& Table() {
       {"this_machine", &L::this_machine, 0, 1, "loopback is limited by address, too"},
       {"connections", &L::connections, 1, 100'000, "open on each port"},
       {"annotations", &L::annotations, 1, 10'000, "that stand at one time"},
-      {"session_annotations", &L::session_annotations, 1, 10'000, "of these by one session"}};
+      {"session_annotations", &L::session_annotations, 1, 10'000, "of these by one person"}};
   return table;
 }
 

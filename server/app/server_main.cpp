@@ -183,7 +183,7 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   gateway_options.web_root = WebRoot(config);
   gateway_options.allowed_hosts = (*door)->allowed_hosts();
   // gRPC's own limit, and what base64 adds: more is nobody's, and is held before it is looked at.
-  gateway_options.max_request_bytes = 512 * 1024;
+  gateway_options.max_request_bytes = 1280 * 1024;
   if (const std::optional<ServerIdentity> tls = (*door)->TlsOf(config.http)) {
     gateway_options.tls_chain_pem = tls->chain_pem;
     gateway_options.tls_key_pem = tls->key_pem;

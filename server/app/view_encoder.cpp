@@ -53,6 +53,10 @@ void ViewEncoder::Redraw(TrackedFrame frame) {
     const std::lock_guard lock(mutex_);
     last_ = std::move(frame);
   }
+  RedrawNewest();
+}
+
+void ViewEncoder::RedrawNewest() {
   if (view_ != VideoView::kAugmented) return;  // nothing is drawn into the other
   redraw_due_ = true;
   Tick();

@@ -42,6 +42,8 @@ class ViewEncoder {
   /// The newest frame once more, with what is known of it now. While frames come the next one shows
   /// it; else it is coded again, at most four times a second: commands never cause video.
   void Redraw(TrackedFrame frame);
+  /// What is drawn into the newest frame changed: as Redraw.
+  void RedrawNewest();
   /// Once a second: what was put off.
   void Tick();
   void SetDemand(bool wanted);

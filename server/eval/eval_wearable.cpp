@@ -32,7 +32,7 @@ absl::StatusOr<Annotation> PlaceAsExpert(Wearable& wearable, AnnotationTarget ta
   draft.target = std::move(target);
   absl::StatusOr<Annotation> answer = absl::InternalError("not answered");
   wearable.Execute(
-      CreateAnnotation{.owner = "expert",
+      CreateAnnotation{.editor = "expert",
                        .draft = std::move(draft),
                        .done = [&answer](absl::StatusOr<Annotation> a) { answer = std::move(a); }});
   return answer;

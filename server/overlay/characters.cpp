@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kMaxCharacters = 1200;
 constexpr std::size_t kMaxMarks = 30;
-constexpr std::size_t kMaxLineFeeds = 8;
+constexpr std::size_t kMaxLineFeeds = 31;  // a check list
 constexpr std::size_t kMaxJoined = 12;  // code points of an emoji sequence; Unicode's have up to 10
 constexpr char32_t kReplacement = 0xfffd, kJoiner = 0x200d, kEmojiSelector = 0xfe0f;
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "server/overlay/painter.hpp"
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 
 namespace saccade {
 

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "server/overlay/label_painter.hpp"
 #include "server/overlay/painter.hpp"
-#include "server/overlay/strokes.hpp"
+#include "server/overlay/picture_painter.hpp"
+#include "shared/marks/strokes.hpp"
 
 namespace saccade {
 namespace {
@@ -52,10 +54,50 @@ void DrawFeatures(const CameraModel& camera, const MapSnapshot& snapshot,
   if (fixated) draw(*fixated, true);  // on top
 }
 
+/// Under every stroke. One that is not to be trusted shows its outline alone.
+void DrawPictures(const CameraModel& camera, const MapSnapshot& snapshot,
+                  const std::vector<Annotation>& annotations, const OverlayOptions& options,
+                  cv::Mat& picture) {
+  if (!options.picture) return;
+  for (const Annotation& annotation : annotations) {
+    const Anchor& anchor = annotation.anchor;
+    const bool trusted =
+        anchor.state == AnchorState::kTracking || anchor.state == AnchorState::kProvisional;
+    if (!annotation.picture || !anchor.place_known || !trusted) continue;
+    const cv::Mat pixels = options.picture(annotation.picture);
+    if (pixels.empty()) continue;
+    DrawPinnedPicture(camera, snapshot.world_from_camera, annotation, pixels, picture);
+  }
+}
+
+/// What others point at or draw now.
+void DrawPointers(const CameraModel& camera, const MapSnapshot& snapshot,
+                  const PointerList& pointers, Painter& painter) {
+  const Rigid3 camera_from_world = snapshot.world_from_camera.Inverse();
+  for (const LivePointer& pointer : pointers) {
+    if (pointer.released || pointer.points->empty()) continue;
+    if (pointer.kind == PointerKind::kSketch) {
+      const std::vector<Polyline2> pieces =
+          ProjectPolyline(camera, camera_from_world, *pointer.points);
+      painter.HaloUnder(pieces, kHaloPx);
+      painter.Lines(pieces, ColorOf(pointer.color_rgba), kLinePx, false);
+      continue;
+    }
+    const std::optional<Eigen::Vector2d> at =
+        camera.Project(camera_from_world * pointer.points->back());
+    if (!at || !at->allFinite() || !camera.InImage(*at, -8.0)) continue;
+    painter.Laser(*at, ColorOf(pointer.color_rgba));
+    painter.Text(*at + painter.scale() * Eigen::Vector2d(10, 5), pointer.display_name,
+                 ColorOf(pointer.color_rgba));
+  }
+}
+
 void DrawAnnotations(const CameraModel& camera, const MapSnapshot& snapshot,
                      const std::vector<Annotation>& annotations, const OverlayOptions& options,
                      cv::Mat& picture, Painter& painter) {
-  const Marks marks = AnnotationMarks(camera, snapshot.world_from_camera, annotations);
+  DrawPictures(camera, snapshot, annotations, options, picture);
+  const Marks marks =
+      AnnotationMarks(camera, snapshot.world_from_camera, annotations, snapshot.metric);
   const auto color = [&options](const std::string& id, std::uint32_t rgba) {
     return options.fixated_annotation == id ? kFixatedColor : ColorOf(rgba);
   };
@@ -132,6 +174,7 @@ cv::Mat Augment(const Frame& frame, const MapSnapshot& snapshot,
     if (options.features) DrawFeatures(camera, snapshot, options, painter);
     if (options.annotations)
       DrawAnnotations(camera, snapshot, annotations, options, picture, painter);
+    if (options.pointers) DrawPointers(camera, snapshot, *options.pointers, painter);
   }
   if (options.status_line) {
     painter.Status(StatusLine(snapshot), snapshot.status != TrackingStatus::kTracking);

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "server/capture/frame.hpp"
+#include "server/pipeline/pointers.hpp"
 #include "shared/scene/annotation.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
@@ -20,6 +23,9 @@ struct OverlayOptions {
   bool status_line = true;                        // one line of text for the wearer
   std::optional<FeatureId> fixated_feature;       // green
   std::optional<std::string> fixated_annotation;  // green
+  std::shared_ptr<const PointerList> pointers;    // null: none
+  /// Decoded, BGR; empty: not yet. Null: outlines alone are drawn.
+  std::function<cv::Mat(const PicturePtr&)> picture;
 };
 
 /// The picture of `frame` with everything that `snapshot` (of the same frame) and `annotations`

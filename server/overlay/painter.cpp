@@ -105,6 +105,17 @@ void Painter::Feature(const Eigen::Vector2d& at, FeatureState state, bool fixate
   }
 }
 
+void Painter::Laser(const Eigen::Vector2d& at, const cv::Scalar& color) {
+  const auto disc = [&](double radius_px, const cv::Scalar& filled) {
+    cv::circle(picture_, Fixed(at),
+               static_cast<int>(std::lround(radius_px * scale_ * (1 << kShift))), filled,
+               cv::FILLED, cv::LINE_AA, kShift);
+  };
+  disc(7.0, kHalo);
+  disc(4.0, color);
+  disc(1.5, {255, 255, 255});
+}
+
 void Painter::Text(const Eigen::Vector2d& at, const std::string& text, const cv::Scalar& color) {
   TextStyle style;
   style.layout = {std::max(kSmallestLetters_px, cvRound(14 * scale_)), 1e9, 1};

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -26,6 +26,8 @@ class Painter {
   void HaloUnder(const std::vector<Polyline2>& lines, double width_px);
   /// Shape by state, so that colour is not alone: disc measured, cross failed, ring not attempted.
   void Feature(const Eigen::Vector2d& at, FeatureState state, bool fixated);
+  /// A disc with a bright middle.
+  void Laser(const Eigen::Vector2d& at, const cv::Scalar& color);
   /// One line over a dark rim; its baseline begins at `at`.
   void Text(const Eigen::Vector2d& at, const std::string& text, const cv::Scalar& color);
   void EdgeArrow(const Eigen::Vector2d& tip, const Eigen::Vector2d& direction,

@@ -16,39 +16,46 @@ template <typename Result>
 using Done = std::function<void(absl::StatusOr<Result>)>;
 using DoneEmpty = std::function<void(absl::Status)>;
 
-// What may be asked of the tracker thread. `owner` is the session, whose own changes Undo takes
-// back.
+// What may be asked of the tracker thread, and by whom.
 struct CreateAnnotation {
-  std::string owner;
+  Editor editor;
   AnnotationDraft draft;
   Done<Annotation> done;  // after the commit
 };
 struct UpdateAnnotation {
-  std::string owner;
+  Editor editor;
   AnnotationPatch patch;
   Done<Annotation> done;
 };
 struct DeleteAnnotation {
-  std::string owner;
+  Editor editor;
   std::string id;
   DoneEmpty done;
 };
+/// Ticks a line of a check list off, or on again.
+struct TickItem {
+  Editor editor;
+  std::string id;
+  std::uint32_t index = 0;
+  bool ticked = false;
+  Done<Annotation> done;
+};
 struct UndoChange {
-  std::string owner;
+  Editor editor;
   bool redo = false;
   Done<std::string> done;  // what was undone, in words
 };
 struct ResetMap {
   Done<std::uint64_t> done;  // the new map_generation
 };
-/// The session is gone: what it did can no longer be undone, and its history is dropped.
-struct ForgetSession {
-  std::string owner;
+/// The person cannot come back: what they did can no longer be undone, and its history is dropped.
+struct ForgetPerson {
+  std::string person_id;
   DoneEmpty done = [](const absl::Status&) {};
 };
 
-using Command = std::variant<CreateAnnotation, UpdateAnnotation, DeleteAnnotation, UndoChange,
-                             ResetMap, ForgetSession>;
+using Command = std::variant<CreateAnnotation, UpdateAnnotation, DeleteAnnotation, TickItem,
+                             UndoChange, ResetMap, ForgetPerson>;
 
 /// Answers a command that will not be carried out.
 void Fail(const Command& command, const absl::Status& status);

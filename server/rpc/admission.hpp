@@ -11,8 +11,19 @@
 namespace saccade {
 
 /// Kinds of calls, by what they cost.
-enum class Toll { kJoin, kSubscribe, kEdit, kReset, kStill, kGaze, kRead, kRedeem };
-inline constexpr int kTolls = 8;
+enum class Toll {
+  kJoin,
+  kSubscribe,
+  kEdit,
+  kReset,
+  kStill,
+  kGaze,
+  kRead,
+  kRedeem,
+  kPoint,
+  kPicture
+};
+inline constexpr int kTolls = 10;
 
 /// How often each kind may be called by one session, by one address, and by all together.
 ///
@@ -27,11 +38,13 @@ struct RpcLimits {
   };
   Kind join{{}, {}, {20, 1000}, {50, 1000}};
   Kind subscribe{{}, {1, 10}, {}, {}};
-  Kind edit{{5, 20}, {100, 1000}, {400, 2000}, {}};  // a stroke that grows: 60 a second
-  Kind reset{{}, {0.2, 3}, {}, {0.5, 6}};            // each throws the map away
-  Kind still{{}, {}, {10, 30}, {20, 40}};            // 10 to 20 ms of a core each
-  Kind gaze{{10, 20}, {60, 120}, {400, 800}, {}};    // heartbeats: 7 to 20 a second
-  Kind read{{}, {}, {100, 500}, {}};                 // up to a megabyte each
+  Kind edit{{5, 20}, {100, 1000}, {400, 2000}, {}};    // a stroke that grows: 60 a second
+  Kind reset{{}, {0.2, 3}, {}, {0.5, 6}};              // each throws the map away
+  Kind still{{}, {}, {10, 30}, {20, 40}};              // 10 to 20 ms of a core each
+  Kind gaze{{10, 20}, {60, 120}, {400, 800}, {}};      // heartbeats: 7 to 20 a second
+  Kind read{{}, {}, {100, 500}, {}};                   // up to a megabyte each
+  Kind point{{60, 120}, {120, 240}, {600, 1200}, {}};  // 60 a second, and who catches up
+  Kind picture{{}, {0.5, 8}, {2, 16}, {4, 32}};        // pinned: up to half a second of a core each
   Kind redeem{{}, {}, {1, 20}, {}};  // of invites, by strangers: nobody else's joins pay for them
 
   const Kind& of(Toll toll) const;

@@ -1,5 +1,11 @@
 #include "server/rpc/annotation_service.hpp"
 
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
 #include "server/rpc/annotation_pages.hpp"
 #include "server/rpc/early_handler.hpp"
 #include "server/rpc/unary_call.hpp"
@@ -13,28 +19,14 @@ wire::ImageSize ImageOf(const Backend& backend) {
   return {backend.facts().camera->width(), backend.facts().camera->height()};
 }
 
-absl::StatusOr<AnnotationPatch> PatchFromProto(const v1::UpdateAnnotationRequest& request,
-                                               const wire::ImageSize& image) {
-  AnnotationPatch patch;
-  if (absl::Status id = wire::CheckUuid(request.id(), "id"); !id.ok()) return id;
-  patch.id = request.id();
-  if (request.has_text()) {
-    absl::Status text = wire::CheckText(request.text(), kMaxTextBytes, "text");
-    if (!text.ok()) return text;
-    patch.text = request.text();
-  }
-  if (request.has_size_m()) {
-    const absl::StatusOr<double> size_m = wire::CheckSize(request.size_m(), "size_m");
-    if (!size_m.ok()) return size_m.status();
-    patch.size_m = *size_m;
-  }
-  if (request.has_color_rgba()) patch.color_rgba = request.color_rgba();
-  if (request.has_target()) {
-    absl::StatusOr<AnnotationTarget> target = wire::FromProto(request.target(), image, "target");
-    if (!target.ok()) return target.status();
-    patch.target = *std::move(target);
-  }
-  return patch;
+Editor EditorOf(const Session& session, const std::string& edit_group = "") {
+  Editor editor;
+  editor.person_id = session.person_id;
+  editor.participant_id = session.participant_id;
+  editor.name = session.display_name;
+  editor.wearer = session.role == v1::ROLE_WEARER;
+  editor.edit_group = edit_group;
+  return editor;
 }
 
 template <typename Response>
@@ -55,6 +47,10 @@ AnnotationService::AnnotationService(Backend& backend, Gatekeeper& gate)
   MarkMethodCallback(3, Early(gate, "AnnotationService/List", this, &AnnotationService::List));
   MarkMethodCallback(4, Early(gate, "AnnotationService/Undo", this, &AnnotationService::Undo));
   MarkMethodCallback(5, Early(gate, "AnnotationService/Redo", this, &AnnotationService::Redo));
+  MarkMethodCallback(
+      6, Early(gate, "AnnotationService/TickCheckItem", this, &AnnotationService::TickCheckItem));
+  MarkMethodCallback(
+      7, Early(gate, "AnnotationService/GetPicture", this, &AnnotationService::GetPicture));
 }
 
 template <typename Request, typename Make>
@@ -73,20 +69,37 @@ grpc::ServerUnaryReactor* AnnotationService::Edit(grpc::CallbackServerContext* c
 grpc::ServerUnaryReactor* AnnotationService::Create(grpc::CallbackServerContext* context,
                                                     const v1::CreateAnnotationRequest* request,
                                                     v1::CreateAnnotationResponse* response) {
-  return Edit(context, request, "AnnotationService/Create",
-              [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
-                if (!request->request_id().empty()) {
-                  absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
-                  if (!uuid.ok()) return uuid;
-                }
-                absl::StatusOr<AnnotationDraft> draft =
-                    wire::FromProto(request->draft(), ImageOf(backend_));
-                if (!draft.ok()) return draft.status();
-                draft->request_id = request->request_id();
-                draft->author = session.display_name;
-                return CreateAnnotation{session.participant_id, *std::move(draft),
-                                        AnswerWithAnnotation(call, response)};
-              });
+  UnaryCall call(*context, "AnnotationService/Create", UnaryCall::Log::kAll);
+  const bool picture = !request->draft().picture().empty();
+  const absl::StatusOr<Session> session =
+      call.Member(gate_, picture ? Toll::kPicture : Toll::kEdit, request->session_id());
+  if (!session.ok()) return call.Finish(session.status());
+  if (!request->request_id().empty()) {
+    absl::Status uuid = wire::CheckUuid(request->request_id(), "request_id");
+    if (!uuid.ok()) return call.Finish(uuid);
+  }
+  if (absl::Status group = wire::CheckEditGroup(request->edit_group()); !group.ok()) {
+    return call.Finish(group);
+  }
+  absl::StatusOr<AnnotationDraft> draft = wire::FromProto(request->draft(), ImageOf(backend_));
+  if (!draft.ok()) return call.Finish(draft.status());
+  draft->request_id = request->request_id();
+  draft->author = session->display_name;
+  CreateAnnotation command{EditorOf(*session, request->edit_group()), *std::move(draft),
+                           AnswerWithAnnotation(call, response)};
+  if (!picture) return call.Submitted(backend_.Submit(std::move(command)));
+  // Decoded first, on another thread.
+  backend_.ReadPicture(
+      request->draft().picture(),
+      [this, call, command = std::move(command)](const absl::StatusOr<PicturePtr>& read) mutable {
+        if (!read.ok()) {
+          call.Finish(read.status());
+          return;
+        }
+        command.draft.picture = *read;
+        call.Submitted(backend_.Submit(std::move(command)));
+      });
+  return call.reactor();
 }
 
 grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext* context,
@@ -94,9 +107,12 @@ grpc::ServerUnaryReactor* AnnotationService::Update(grpc::CallbackServerContext*
                                                     v1::UpdateAnnotationResponse* response) {
   return Edit(context, request, "AnnotationService/Update",
               [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
-                absl::StatusOr<AnnotationPatch> patch = PatchFromProto(*request, ImageOf(backend_));
+                absl::Status group = wire::CheckEditGroup(request->edit_group());
+                if (!group.ok()) return group;
+                absl::StatusOr<AnnotationPatch> patch =
+                    wire::FromProto(*request, ImageOf(backend_));
                 if (!patch.ok()) return patch.status();
-                return UpdateAnnotation{session.participant_id, *std::move(patch),
+                return UpdateAnnotation{EditorOf(session, request->edit_group()), *std::move(patch),
                                         AnswerWithAnnotation(call, response)};
               });
 }
@@ -106,10 +122,47 @@ grpc::ServerUnaryReactor* AnnotationService::Delete(grpc::CallbackServerContext*
                                                     v1::DeleteAnnotationResponse* /*response*/) {
   return Edit(context, request, "AnnotationService/Delete",
               [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
+                absl::Status group = wire::CheckEditGroup(request->edit_group());
+                if (!group.ok()) return group;
                 absl::Status uuid = wire::CheckUuid(request->id(), "id");
                 if (!uuid.ok()) return uuid;
-                return DeleteAnnotation{session.participant_id, request->id(), call.Answer()};
+                return DeleteAnnotation{EditorOf(session, request->edit_group()), request->id(),
+                                        call.Answer()};
               });
+}
+
+grpc::ServerUnaryReactor* AnnotationService::TickCheckItem(grpc::CallbackServerContext* context,
+                                                           const v1::TickCheckItemRequest* request,
+                                                           v1::TickCheckItemResponse* response) {
+  return Edit(context, request, "AnnotationService/TickCheckItem",
+              [&](UnaryCall& call, const Session& session) -> absl::StatusOr<Command> {
+                absl::Status uuid = wire::CheckUuid(request->id(), "id");
+                if (!uuid.ok()) return uuid;
+                return TickItem{EditorOf(session), request->id(), request->index(), request->done(),
+                                AnswerWithAnnotation(call, response)};
+              });
+}
+
+grpc::ServerUnaryReactor* AnnotationService::GetPicture(grpc::CallbackServerContext* context,
+                                                        const v1::GetPictureRequest* request,
+                                                        v1::GetPictureResponse* response) {
+  UnaryCall call(*context, "AnnotationService/GetPicture", UnaryCall::Log::kRefusals);
+  const absl::StatusOr<Session> session = call.Member(gate_, Toll::kRead, request->session_id());
+  if (!session.ok()) return call.Finish(session.status());
+  call.set_log(UnaryCall::Log::kNothing);
+  if (absl::Status uuid = wire::CheckUuid(request->id(), "id"); !uuid.ok()) {
+    return call.Finish(uuid);
+  }
+  const std::shared_ptr<const AnnotationList> annotations = backend_.annotations();
+  const auto found = std::find_if(annotations->begin(), annotations->end(),
+                                  [&](const Annotation& one) { return one.id == request->id(); });
+  if (found == annotations->end() || found->picture == nullptr) {
+    return call.Finish(absl::NotFoundError(absl::StrCat(
+        "id '", request->id(), "' is no picture; list annotations to see which there are")));
+  }
+  *response->mutable_facts() = wire::ToProto(*found->picture);
+  response->set_picture(found->picture->bytes);
+  return call.Finish(absl::OkStatus());
 }
 
 grpc::ServerUnaryReactor* AnnotationService::List(grpc::CallbackServerContext* context,
@@ -135,7 +188,7 @@ grpc::ServerUnaryReactor* AnnotationService::TakeBack(grpc::CallbackServerContex
                 const auto fill = [response](const std::string& description) {
                   response->set_description(description);
                 };
-                return UndoChange{session.participant_id, redo, call.Answer<std::string>(fill)};
+                return UndoChange{EditorOf(session), redo, call.Answer<std::string>(fill)};
               });
 }
 

@@ -32,6 +32,13 @@ class AnnotationService final : public v1::AnnotationService::CallbackService {
                                  const v1::RedoAnnotationRequest* request,
                                  v1::RedoAnnotationResponse* response) override;
 
+  grpc::ServerUnaryReactor* TickCheckItem(grpc::CallbackServerContext* context,
+                                          const v1::TickCheckItemRequest* request,
+                                          v1::TickCheckItemResponse* response) override;
+  grpc::ServerUnaryReactor* GetPicture(grpc::CallbackServerContext* context,
+                                       const v1::GetPictureRequest* request,
+                                       v1::GetPictureResponse* response) override;
+
   /// A call of an editor that is one command for the tracker thread: `make(call, session)` checks
   /// the request and makes it.
   template <typename Request, typename Make>

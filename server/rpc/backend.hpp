@@ -2,16 +2,19 @@
 
 #include <absl/container/flat_hash_set.h>
 #include <absl/status/statusor.h>
+#include <absl/types/span.h>
 
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/pipeline/commands.hpp"
 #include "server/pipeline/events.hpp"
 #include "server/pipeline/gaze_commands.hpp"
+#include "server/pipeline/pointers.hpp"
 
 namespace saccade {
 
@@ -47,6 +50,15 @@ class Backend : public CommandPort {
   ///   NotFound           no longer, or not yet, in the ring
   ///   ResourceExhausted  too many stills are being made
   virtual void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) = 0;
+  /// Where pointers point: PointerPlacer's Locate, and Trace where there is a `surface`.
+  virtual absl::StatusOr<std::vector<Eigen::Vector3d>> LocatePointer(
+      absl::Span<const AnnotationTarget> points, std::optional<StrokeSurface>* surface) = 0;
+  /// What is pointed at now, for the augmented view; never null.
+  virtual void SetPointers(std::shared_ptr<const PointerList> pointers) = 0;
+  /// Reads the file of a picture on another thread. Errors go to `done`:
+  ///   InvalidArgument    no PNG or JPEG, too large, damaged; says so after "draft.picture: "
+  ///   ResourceExhausted  too many are being read
+  virtual void ReadPicture(std::string bytes, Done<PicturePtr> done) = 0;
   /// Who has a stream open, by participant_id; never null.
   virtual void SetPresence(std::shared_ptr<const ParticipantSet> present) = 0;
   /// Whether anybody watches; nothing is coded for nobody.

@@ -26,10 +26,18 @@ double ShiftPx(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Tra
   return shift_m / std::max(distance_m, 1e-3) / event.camera->RadiansPerPixel();
 }
 
+bool SameTurn(const Annotation& a, const Annotation& b) {
+  if (!a.world_from_mark || !b.world_from_mark) return !a.world_from_mark && !b.world_from_mark;
+  return a.world_from_mark->coeffs() == b.world_from_mark->coeffs();
+}
+
 // Not the revision alone: an edit that the disk refused is taken back, and its number used again.
 bool SameContent(const Annotation& a, const Annotation& b) {
   return a.revision == b.revision && a.ink_offset_m.identity() == b.ink_offset_m.identity() &&
-         a.text == b.text && a.color_rgba == b.color_rgba && a.size_m == b.size_m;
+         a.text == b.text && a.color_rgba == b.color_rgba && a.size_m == b.size_m &&
+         a.locked == b.locked && a.extent_m == b.extent_m && SameTurn(a, b) &&
+         a.length_m == b.length_m && a.length_sigma_m == b.length_sigma_m &&
+         a.check_items == b.check_items && a.picture == b.picture;
 }
 
 bool EstimateChanged(const Annotation& now, const Annotation& sent, Timestamp age_ns,

@@ -14,7 +14,10 @@ constexpr std::size_t kFeatureBytes = 160;
 constexpr std::size_t kFeatureRemovalBytes = 10;
 constexpr std::size_t kIdBytes = 40;
 constexpr std::size_t kAnchorBytes = 160;
-constexpr std::size_t kAnnotationBytes = 120;
+constexpr std::size_t kAnnotationBytes = 127;
+constexpr std::size_t kTurnBytes = 41, kExtentBytes = 31, kNumberBytes = 7, kLengthsBytes = 20;
+constexpr std::size_t kPictureBytes = 30;                          // but for its texts
+constexpr std::size_t kItemBytes = 26;
 constexpr std::size_t kInkPointBytes = 29;
 constexpr std::size_t kLengthBytes = 6;
 
@@ -126,9 +129,20 @@ std::size_t AnchorBytes(const Anchor& anchor) {
 }  // namespace
 
 std::size_t EncodedBytes(const Annotation& annotation) {
-  return kAnnotationBytes + annotation.id.size() + annotation.text.size() +
-         annotation.author.size() + AnchorBytes(annotation.anchor) +
-         kInkPointBytes * annotation.ink_offset_m.size();
+  std::size_t bytes = kAnnotationBytes + annotation.id.size() + annotation.text.size() +
+                      annotation.author.size() + annotation.author_person_id.size() +
+                      AnchorBytes(annotation.anchor) +
+                      kInkPointBytes * annotation.ink_offset_m.size();
+  if (annotation.picture) {
+    bytes +=
+        kPictureBytes + annotation.picture->sha256.size() + annotation.picture->media_type.size();
+  }
+  if (annotation.check_items) {
+    for (const CheckItem& item : *annotation.check_items) {
+      bytes += kItemBytes + item.text.size() + item.done_by.size();
+    }
+  }
+  return bytes;
 }
 
 bool MapReader::Next(const NumberedState& state, v1::MapDelta& delta) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <absl/strings/str_cat.h>
 #include <grpc/byte_buffer.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/support/server_callback.h>
@@ -11,6 +12,11 @@
 #include "server/rpc/status.hpp"
 
 namespace saccade {
+
+/// Of a method's request [bytes]: pictures are large, nothing else is.
+inline std::size_t LargestRequest(absl::string_view method) {
+  return method == "AnnotationService/Create" ? 1280 * 1024 : 256 * 1024;
+}
 
 /// Asks Gatekeeper::Arrive before the message of a unary call is parsed, which gRPC's own handler
 /// does before anybody is asked. Who is refused costs a look at two buckets and an answer.
@@ -37,8 +43,12 @@ class EarlyHandler final : public grpc::internal::MethodHandler {
   void RunHandler(const HandlerParameter& parameter) override {
     auto* bytes = static_cast<grpc_byte_buffer*>(parameter.internal_data);
     const auto& context = *static_cast<grpc::CallbackServerContext*>(parameter.server_context);
-    const absl::Status early =
-        gate_.Arrive(context, bytes == nullptr ? 0 : grpc_byte_buffer_length(bytes));
+    const std::size_t size = bytes == nullptr ? 0 : grpc_byte_buffer_length(bytes);
+    absl::Status early = gate_.Arrive(context, size);
+    if (early.ok() && size > LargestRequest(method_)) {
+      early = absl::ResourceExhaustedError(
+          absl::StrCat("request: ", size, " bytes are more than ", LargestRequest(method_)));
+    }
     if (!early.ok()) {
       if (bytes != nullptr) grpc_byte_buffer_destroy(bytes);
       bytes = grpc_raw_byte_buffer_create(nullptr, 0);

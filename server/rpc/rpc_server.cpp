@@ -13,6 +13,8 @@
 #include "server/rpc/health_service.hpp"
 #include "server/rpc/live_pem.hpp"
 #include "server/rpc/map_service.hpp"
+#include "server/rpc/pointer_board.hpp"
+#include "server/rpc/pointer_service.hpp"
 #include "server/rpc/session_service.hpp"
 
 namespace saccade {
@@ -76,9 +78,15 @@ class RpcServer::Impl {
  public:
   Impl(const RpcServerOptions& options, Backend& backend, StreamHub& hub)
       : hub_(hub),
-        sessions_(
-            options.sessions,
-            [&backend](const std::string& id) { return backend.Submit(ForgetSession{id}).ok(); }),
+        sessions_(options.sessions,
+                  [this, &backend](const Session& gone) {
+                    pointers_.EndParticipant(gone.participant_id);
+                    return gone.has_key || backend.Submit(ForgetPerson{gone.person_id}).ok();
+                  }),
+        pointers_([&backend, &hub](const std::shared_ptr<const PointerList>& pointers) {
+          hub.OnPointers(pointers);
+          backend.SetPointers(pointers);
+        }),
         own_access_(options.access == nullptr ? AccessBook::InMemory({}) : nullptr),
         access_(options.access == nullptr ? *own_access_ : *options.access),
         gate_(sessions_, access_,
@@ -88,9 +96,11 @@ class RpcServer::Impl {
         session_service_(backend, hub, gate_),
         annotation_service_(backend, gate_),
         map_service_(backend, hub, gate_),
-        gaze_service_(backend, gate_) {
+        gaze_service_(backend, gate_),
+        pointer_service_(backend, pointers_, gate_) {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
+      pointers_.EndAccess(ids);
       hub_.End(ids, why);
       health_service_.End(ids, why);
     });
@@ -133,6 +143,7 @@ class RpcServer::Impl {
     builder.RegisterService(&annotation_service_);
     builder.RegisterService(&map_service_);
     builder.RegisterService(&gaze_service_);
+    builder.RegisterService(&pointer_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
     listener_ = *std::move(listener);
@@ -165,6 +176,7 @@ class RpcServer::Impl {
 
   StreamHub& hub_;
   SessionTable sessions_;
+  PointerBoard pointers_;
   const std::unique_ptr<AccessBook> own_access_;
   AccessBook& access_;
   Gatekeeper gate_;
@@ -174,6 +186,7 @@ class RpcServer::Impl {
   AnnotationService annotation_service_;
   MapService map_service_;
   GazeService gaze_service_;
+  PointerService pointer_service_;
   std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
   std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs
   std::unique_ptr<grpc::Server> server_;

@@ -31,8 +31,9 @@ struct TlsPair {
 struct RpcServerOptions {
   std::string host = "127.0.0.1";
   int port = 50051;  // 0: any free one, see RpcServer::port
-  /// A stroke of 2000 points is 50 KB. Larger requests: RESOURCE_EXHAUSTED, unparsed.
-  int max_request_bytes = 256 * 1024;
+  /// A stroke of 2000 points is 50 KB, a picture up to 1 MB (LargestRequest says what each method
+  /// takes). Larger requests: RESOURCE_EXHAUSTED, unparsed.
+  int max_request_bytes = 1280 * 1024;
   SessionTableOptions sessions;
   RpcLimits limits;
   TrafficLimits traffic;

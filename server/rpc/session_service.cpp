@@ -48,6 +48,8 @@ grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* cont
   const ServerFacts& facts = backend_.facts();
   response->set_session_id(session->id);
   response->set_participant_id(session->participant_id);
+  response->set_person_id(session->person_id);
+  response->set_color_rgba(session->color_rgba);
   response->set_server_version(facts.version);
   response->set_source(facts.source);
   *response->mutable_intrinsics() = wire::ToProto(facts.camera->intrinsics());

@@ -8,10 +8,14 @@
 #include <random>
 
 #include "server/pipeline/busy.hpp"
+#include "server/rpc/persons.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade {
 namespace {
+
+constexpr std::size_t kKeptColors = 4096;
+constexpr Timestamp kPresent = 60'000'000'000;  // so long after its last word, without a stream
 
 // RFC 4122 version 4, from the system's entropy.
 std::string NewUuid() {
@@ -62,6 +66,9 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
     absl::Status uuid = wire::CheckUuid(resumed, "resume_session_id");
     if (!uuid.ok()) return uuid;
   }
+  if (const std::string& key = request.person_key(); !key.empty()) {
+    if (absl::Status good = CheckPersonKey(key); !good.ok()) return good;
+  }
   Session session;
   session.display_name = request.display_name().empty() ? "guest" : request.display_name();
   session.role = RoleWithin(request.role(), access.role);
@@ -72,6 +79,10 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
     Slot& slot = known->second;
     session.id = slot.session.id;
     session.participant_id = slot.session.participant_id;
+    session.person_id = slot.session.person_id;
+    session.has_key = slot.session.has_key;
+    Identify(request.person_key(), now_ns, session);
+    if (session.person_id != slot.session.person_id) gone_.push_back(slot.session);
     slot.session = session;
     slot.used_ns = now_ns;
     slot.used = true;
@@ -84,8 +95,31 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
   }
   session.id = NewUuid();
   session.participant_id = NewUuid();
+  Identify(request.person_key(), now_ns, session);
   sessions_[session.id] = {session, now_ns};
   return session;
+}
+
+/// Who it is, and in which colour.
+void SessionTable::Identify(const std::string& key, Timestamp now_ns, Session& session) {
+  if (!key.empty()) {
+    session.person_id = PersonIdOf(key);
+    session.has_key = true;
+  } else if (session.person_id.empty()) {
+    session.person_id = NewUuid();
+  }
+  const auto had = colors_.find(session.person_id);
+  if (had != colors_.end()) {
+    session.color_rgba = had->second;
+    return;
+  }
+  absl::flat_hash_map<std::string, std::uint32_t> in_use;
+  for (const auto& [id, slot] : sessions_) {
+    if (slot.holds == 0 && now_ns - slot.used_ns > kPresent) continue;
+    in_use[slot.session.person_id] = slot.session.color_rgba;
+  }
+  if (colors_.size() >= kKeptColors) colors_ = in_use;
+  session.color_rgba = colors_[session.person_id] = ChoosePersonColor(session.person_id, in_use);
 }
 
 // Of one's own sessions those that nobody uses make room: they are nobody else's.
@@ -106,7 +140,7 @@ absl::Status SessionTable::CheckToken(const std::string& access_id, Timestamp no
         absl::StrCat("sessions: ", count, " of this invite are in use, as many as may"),
         options_.unused_ns);
   }
-  if (oldest->second.used) gone_.push_back(oldest->second.session.participant_id);
+  if (oldest->second.used) gone_.push_back(oldest->second.session);
   sessions_.erase(oldest);
   TellGone();
   return absl::OkStatus();
@@ -124,14 +158,14 @@ bool SessionTable::MakeRoom(Timestamp now_ns) {
     if (chosen == sessions_.end() || rank(slot) < rank(chosen->second)) chosen = at;
   }
   if (chosen == sessions_.end()) return false;
-  if (chosen->second.used) gone_.push_back(chosen->second.session.participant_id);
+  if (chosen->second.used) gone_.push_back(chosen->second.session);
   sessions_.erase(chosen);
   TellGone();
   return true;
 }
 
 void SessionTable::TellGone() {
-  std::erase_if(gone_, [this](const std::string& id) { return !on_gone_ || on_gone_(id); });
+  std::erase_if(gone_, [this](const Session& gone) { return !on_gone_ || on_gone_(gone); });
 }
 
 void SessionTable::End(const std::vector<std::string>& access_ids) {
@@ -140,7 +174,7 @@ void SessionTable::End(const std::vector<std::string>& access_ids) {
     const Slot& slot = entry.second;
     const bool ends =
         std::find(access_ids.begin(), access_ids.end(), slot.session.access_id) != access_ids.end();
-    if (ends && slot.used) gone_.push_back(slot.session.participant_id);
+    if (ends && slot.used) gone_.push_back(slot.session);
     return ends;
   });
   TellGone();

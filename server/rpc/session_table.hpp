@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -23,6 +24,9 @@ struct Session {
   std::string display_name;
   v1::Role role = v1::ROLE_EXPERT;
   std::string access_id;  // of the token that joined (Access::id); no other may use the session
+  std::string person_id;  // UUID; public: who stands behind it, in this session and others
+  bool has_key = false;   // the person can come back in another session
+  std::uint32_t color_rgba = 0;  // the person's
 };
 
 /// One line that goes into others' lists and into the log. InvalidArgument: too long, or it holds a
@@ -41,17 +45,18 @@ struct SessionTableOptions {
 /// Who joined. Bounded. Thread safe.
 class SessionTable {
  public:
-  /// Told the participant_id of each session that goes and was used, so that what is kept for it
-  /// elsewhere goes too; false: not now, and it is told again with the next one. Called from
-  /// Join(); must not block or call back.
-  using OnGone = std::function<bool(const std::string& participant_id)>;
+  /// Told of each session that goes and was used, so that what is kept for it elsewhere goes too;
+  /// false: not now, and it is told again with the next one. Called from Join(); must not block or
+  /// call back.
+  using OnGone = std::function<bool(const Session& session)>;
 
   explicit SessionTable(const SessionTableOptions& options = {}, OnGone on_gone = nullptr)
       : options_(options), on_gone_(std::move(on_gone)) {}
 
   /// Makes a session, or goes on with `request.resume_session_id` if there is one of that id and
   /// token. Its role is what was asked for, as far as `access` reaches: who may not be the wearer
-  /// is an expert, and who may only look a viewer.
+  /// is an expert, and who may only look a viewer. The person is the one of `request.person_key`;
+  /// without a key the one of the resumed session, or a new one.
   ///   InvalidArgument    names the field
   ///   ResourceExhausted  the table is full of sessions in use
   absl::StatusOr<Session> Join(const v1::JoinRequest& request, Timestamp now_ns = MonotonicNow(),
@@ -84,11 +89,13 @@ class SessionTable {
   absl::Status CheckToken(const std::string& access_id, Timestamp now_ns);
   void Release(const std::string& session_id);
   void TellGone();
+  void Identify(const std::string& key, Timestamp now_ns, Session& session);
 
   const SessionTableOptions options_;
   const OnGone on_gone_;
   std::mutex mutex_;
-  std::vector<std::string> gone_;  // not told yet
+  std::vector<Session> gone_;                               // not told yet
+  absl::flat_hash_map<std::string, std::uint32_t> colors_;  // by person
   absl::flat_hash_map<std::string, Slot> sessions_;
 };
 

@@ -61,6 +61,10 @@ void StreamHub::OnEndOfSource(std::uint64_t frames) {
   Leave([&](Pending& pending) { end_frames_ = pending.end_frames = frames; });
 }
 
+void StreamHub::OnPointers(std::shared_ptr<const PointerList> pointers) {
+  Leave([&](Pending& pending) { pointers_ = pending.pointers = std::move(pointers); });
+}
+
 void StreamHub::AbandonTheSilent(Timestamp now_ns) {
   std::vector<std::shared_ptr<Subscriber>> silent;
   {
@@ -120,6 +124,7 @@ struct StreamHub::Round {
   std::shared_ptr<const GazeSnapshot> gaze;
   std::optional<std::uint64_t> end_frames;
   std::shared_ptr<const v1::PresenceEvent> presence;
+  std::shared_ptr<const PointerList> pointers;
 
   void OfferTo(Subscription& subscription) const {
     if (state) subscription.Offer(*state, frames_passed_over);
@@ -130,6 +135,7 @@ struct StreamHub::Round {
     if (gaze) subscription.OfferGaze(gaze);
     if (end_frames) subscription.OfferEnd(*end_frames);
     if (presence) subscription.OfferPresence(presence);
+    if (pointers) subscription.OfferPointers(pointers);
   }
 };
 
@@ -148,6 +154,7 @@ StreamHub::Round StreamHub::Prepare() {
     round.statistics = pending.statistics;
     round.gaze = std::move(pending.gaze);
     round.end_frames = pending.end_frames;
+    round.pointers = std::move(pending.pointers);
     if (presence_changed_ && now_ns - presence_ns_ >= kPresenceInterval) {
       presence_changed_ = false;
       presence_ns_ = now_ns;
@@ -201,11 +208,13 @@ void StreamHub::Add(const std::shared_ptr<Subscriber>& subscriber) {
     const std::optional<NumberedState> state = numbered();
     const std::optional<std::uint64_t> end = end_of_source();
     const std::shared_ptr<const v1::PresenceEvent> present = presence();
+    const std::shared_ptr<const PointerList> pointing = pointers();
     subscriber->Update([&](Subscription& subscription) {
       if (state) subscription.Offer(*state);
       subscription.OfferGaze(backend_->gaze());
       if (end) subscription.OfferEnd(*end);
       subscription.OfferPresence(present);
+      if (pointing) subscription.OfferPointers(pointing);
     });
   };
   // Before the hub's thread knows of it: the first events are the whole state. And once more after,
@@ -255,6 +264,8 @@ void StreamHub::StreamsChanged() {
       participant.set_participant_id(stream->session().participant_id);
       participant.set_display_name(stream->session().display_name);
       participant.set_role(stream->session().role);
+      participant.set_person_id(stream->session().person_id);
+      participant.set_color_rgba(stream->session().color_rgba);
       present->insert(stream->session().participant_id);
       if (stream->wants_video()) wanted[static_cast<std::size_t>(stream->view())] = true;
     }
@@ -320,6 +331,11 @@ EngineStatistics StreamHub::statistics() const {
 std::shared_ptr<const v1::PresenceEvent> StreamHub::presence() const {
   const std::lock_guard lock(mutex_);
   return presence_;
+}
+
+std::shared_ptr<const PointerList> StreamHub::pointers() const {
+  const std::lock_guard lock(mutex_);
+  return pointers_;
 }
 
 std::optional<std::uint64_t> StreamHub::end_of_source() const {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/pipeline/events.hpp"
+#include "server/pipeline/pointers.hpp"
 #include "server/pipeline/runner.hpp"
 #include "server/rpc/backend.hpp"
 #include "server/rpc/event_bytes.hpp"
@@ -89,6 +90,8 @@ class StreamHub : public EventSink {
   void OnStatistics(const EngineStatistics& statistics) override;
   void OnGaze(const std::shared_ptr<const GazeSnapshot>& state) override;
   void OnEndOfSource(std::uint64_t frames) override;
+  /// What is pointed at now. Any thread; must come in order.
+  void OnPointers(std::shared_ptr<const PointerList> pointers);
 
   /// Opens a stream; one that the same session had is closed (Aborted).
   void Add(const std::shared_ptr<Subscriber>& subscriber);
@@ -109,6 +112,7 @@ class StreamHub : public EventSink {
   EngineStatistics statistics() const;
   std::shared_ptr<const v1::PresenceEvent> presence() const;
   std::optional<std::uint64_t> end_of_source() const;
+  std::shared_ptr<const PointerList> pointers() const;
 
  private:
   /// What was left since the last round.
@@ -119,6 +123,7 @@ class StreamHub : public EventSink {
     std::optional<EngineStatistics> statistics;
     std::shared_ptr<const GazeSnapshot> gaze;
     std::optional<std::uint64_t> end_frames;
+    std::shared_ptr<const PointerList> pointers;
   };
   struct Wake {};
   /// The same, worked out and ready to be offered.
@@ -151,6 +156,7 @@ class StreamHub : public EventSink {
   EngineStatistics statistics_;
   std::shared_ptr<const v1::PresenceEvent> presence_;
   std::optional<std::uint64_t> end_frames_;
+  std::shared_ptr<const PointerList> pointers_;  // null: none so far
   Pending pending_;
   bool presence_changed_ = false;
   std::array<KeyFrameRequests, kVideoViews> key_frames_;

@@ -134,6 +134,8 @@ std::optional<Subscription::Payload> Subscription::Fill(Kind kind, Timestamp now
       return Payload{v1::Event::kStatisticsFieldNumber,
                      Serialized(StatisticsToProto(*std::exchange(statistics_, std::nullopt),
                                                   video_.skipped() + poses_skipped_))};
+    case kPointers:
+      return FillPointers();
     case kEnd: {
       if (!end_frames_) return std::nullopt;
       v1::EndOfSource end;
@@ -170,6 +172,16 @@ std::optional<Subscription::Payload> Subscription::FillVideo(Timestamp now_ns) {
   if (packet == nullptr) return std::nullopt;
   return Payload{v1::Event::kAccessUnitFieldNumber, bytes_->AccessUnit(packet, Has(v1::TOPIC_MAP)),
                  QueuedStage(now_ns)};
+}
+
+// Nobody shares it: each has heard something else of a stroke.
+std::optional<Subscription::Payload> Subscription::FillPointers() {
+  if (!Has(v1::TOPIC_POINTER) || !std::exchange(pointers_due_, false)) return std::nullopt;
+  v1::PointerEvent event;
+  const bool any = pointer_reader_.Next(*pointers_, event);
+  pointers_due_ = !pointer_reader_.complete();
+  if (!any) return std::nullopt;
+  return Payload{v1::Event::kPointerFieldNumber, Serialized(event)};
 }
 
 v1::StatisticsEvent StatisticsToProto(const EngineStatistics& statistics,

@@ -13,15 +13,17 @@
 
 #include "saccade/v1/session.pb.h"
 #include "server/pipeline/events.hpp"
+#include "server/pipeline/pointers.hpp"
 #include "server/rpc/deltas.hpp"
 #include "server/rpc/event_bytes.hpp"
+#include "server/rpc/pointer_reader.hpp"
 #include "server/rpc/video_queue.hpp"
 
 namespace saccade {
 
 /// What a subscriber asked for, checked.
 struct SubscriptionOptions {
-  std::bitset<8> topics;  // by v1::Topic
+  std::bitset<16> topics;  // by v1::Topic
   VideoView view = VideoView::kRaw;
   std::uint32_t window = 32;  // events in flight unacknowledged
 
@@ -49,6 +51,10 @@ class Subscription {
   void Offer(const EngineStatistics& statistics);
   void OfferGaze(std::shared_ptr<const GazeSnapshot> state);
   void OfferPresence(std::shared_ptr<const v1::PresenceEvent> presence);
+  void OfferPointers(std::shared_ptr<const PointerList> pointers) {
+    pointers_ = std::move(pointers);
+    pointers_due_ = true;
+  }
   void OfferEnd(std::uint64_t frames) {
     if (!std::exchange(end_seen_, true)) end_frames_ = frames;
   }
@@ -70,7 +76,18 @@ class Subscription {
   std::optional<Timestamp> unacknowledged_since() const { return unacknowledged_since_; }
 
  private:
-  enum Kind { kAnnotations, kMap, kPresence, kGaze, kPose, kVideo, kStatistics, kEnd, kKinds };
+  enum Kind {
+    kAnnotations,
+    kMap,
+    kPresence,
+    kGaze,
+    kPose,
+    kVideo,
+    kStatistics,
+    kPointers,
+    kEnd,
+    kKinds
+  };
 
   bool Has(v1::Topic topic) const { return options_.topics.test(static_cast<std::size_t>(topic)); }
   bool WindowOpen() const { return sequence_ - acknowledged_ < options_.window; }
@@ -84,6 +101,7 @@ class Subscription {
   std::optional<Payload> FillAnnotations();
   std::optional<Payload> FillMap();
   std::optional<Payload> FillVideo(Timestamp now_ns);
+  std::optional<Payload> FillPointers();
 
   const SubscriptionOptions options_;
   const std::shared_ptr<EventBytes> bytes_;
@@ -102,6 +120,9 @@ class Subscription {
   AnnotationReader annotations_;
   VideoQueue video_;
   std::shared_ptr<const v1::PresenceEvent> presence_, presence_seen_;
+  std::shared_ptr<const PointerList> pointers_;  // null: none so far
+  bool pointers_due_ = false;
+  PointerReader pointer_reader_;
   std::optional<EngineStatistics> statistics_;
   std::optional<std::uint64_t> end_frames_;
   bool end_seen_ = false;

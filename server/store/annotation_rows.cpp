@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/store/annotation_parts.hpp"
+
 namespace saccade {
 namespace {
 
@@ -30,6 +32,28 @@ CREATE TABLE audit(
   action TEXT NOT NULL, annotation_id TEXT NOT NULL, request_id TEXT NOT NULL,
   description TEXT NOT NULL) STRICT;
 CREATE INDEX audit_by_request ON audit(number) WHERE request_id <> '';
+)",
+    R"(
+ALTER TABLE annotations ADD COLUMN author_person_id TEXT NOT NULL DEFAULT '';
+ALTER TABLE annotations ADD COLUMN locked INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE annotations ADD COLUMN locked_by TEXT NOT NULL DEFAULT '';
+ALTER TABLE annotations ADD COLUMN world_from_mark_xyzw BLOB NOT NULL DEFAULT x'';
+ALTER TABLE annotations ADD COLUMN extent_m BLOB NOT NULL DEFAULT x'';
+ALTER TABLE annotations ADD COLUMN pin_number INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE annotations ADD COLUMN length_m REAL NOT NULL DEFAULT 0;
+ALTER TABLE annotations ADD COLUMN length_sigma_m REAL NOT NULL DEFAULT 0;
+ALTER TABLE annotations ADD COLUMN end_covariance_m2 BLOB NOT NULL DEFAULT x'';
+ALTER TABLE annotations ADD COLUMN picture_sha256 TEXT NOT NULL DEFAULT '';
+ALTER TABLE audit ADD COLUMN person_id TEXT NOT NULL DEFAULT '';
+CREATE INDEX annotations_by_picture ON annotations(picture_sha256) WHERE picture_sha256 <> '';
+CREATE TABLE pictures(
+  sha256 TEXT PRIMARY KEY, media_type TEXT NOT NULL, width INTEGER NOT NULL, height INTEGER NOT NULL,
+  bytes BLOB NOT NULL) STRICT;
+CREATE TABLE check_items(
+  annotation_id TEXT NOT NULL, position INTEGER NOT NULL, text TEXT NOT NULL, done INTEGER NOT NULL,
+  done_by TEXT NOT NULL, done_unix_ns INTEGER NOT NULL,
+  PRIMARY KEY(annotation_id, position)) STRICT;
+CREATE TABLE counters(name TEXT PRIMARY KEY, value INTEGER NOT NULL) STRICT;
 )"};
 
 const char* ActionName(EditKind kind) {
@@ -50,9 +74,14 @@ const char* ActionName(EditKind kind) {
   return "unknown";
 }
 
+std::vector<double> UpperTriangle(const Eigen::Matrix3d& c) {
+  return {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
+}
+
 absl::Status Upsert(SqliteDatabase& database, const StoredAnnotation& stored) {
   absl::StatusOr<SqliteStatement> statement = database.Prepare(
-      "INSERT OR REPLACE INTO annotations VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+      "INSERT OR REPLACE INTO annotations "
+      "VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   if (!statement.ok()) return statement.status();
   const Annotation& annotation = stored.annotation;
   const Anchor& anchor = annotation.anchor;
@@ -61,7 +90,6 @@ absl::Status Upsert(SqliteDatabase& database, const StoredAnnotation& stored) {
   for (const Eigen::Vector3d& offset : annotation.ink_offset_m) {
     ink.insert(ink.end(), {offset.x(), offset.y(), offset.z()});
   }
-  const Eigen::Matrix3d& c = anchor.covariance_in_world;
   statement->Bind(0, annotation.id);
   statement->Bind(1, static_cast<std::int64_t>(annotation.shape));
   statement->Bind(2, annotation.text);
@@ -73,9 +101,26 @@ absl::Status Upsert(SqliteDatabase& database, const StoredAnnotation& stored) {
   statement->Bind(8, static_cast<std::int64_t>(anchor.method));
   for (int axis = 0; axis < 3; ++axis) statement->Bind(9 + axis, anchor.point_in_world(axis));
   statement->Bind(12, anchor.error_m);
-  statement->Bind(13, std::vector<double>{c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
+  statement->Bind(13, UpperTriangle(anchor.covariance_in_world));
   statement->Bind(14, ink);
   statement->Bind(15, stored.world_key);
+  statement->Bind(16, annotation.author_person_id);
+  statement->Bind(17, std::int64_t{annotation.locked});
+  statement->Bind(18, annotation.locked_by);
+  std::vector<double> rotation, extent, end;
+  if (const auto& q = annotation.world_from_mark) rotation = {q->x(), q->y(), q->z(), q->w()};
+  const Eigen::Vector3d& e = annotation.extent_m;
+  if (annotation.shape == AnnotationShape::kBox) extent = {e.x(), e.y(), e.z()};
+  if (annotation.shape == AnnotationShape::kMeasure) {
+    end = UpperTriangle(stored.end_covariance_in_world);
+  }
+  statement->Bind(19, rotation);
+  statement->Bind(20, extent);
+  statement->Bind(21, std::int64_t{annotation.number});
+  statement->Bind(22, annotation.length_m);
+  statement->Bind(23, annotation.length_sigma_m);
+  statement->Bind(24, end);
+  statement->Bind(25, annotation.picture ? annotation.picture->sha256 : std::string());
   return statement->Run();
 }
 
@@ -89,8 +134,8 @@ absl::Status Erase(SqliteDatabase& database, const std::string& id) {
 
 absl::Status Audit(SqliteDatabase& database, const AnnotationChange& change) {
   absl::StatusOr<SqliteStatement> statement = database.Prepare(
-      "INSERT INTO audit(unix_ns, session_id, action, annotation_id, request_id, description) "
-      "VALUES(?,?,?,?,?,?)");
+      "INSERT INTO audit(unix_ns, session_id, action, annotation_id, request_id, description, "
+      "person_id) VALUES(?,?,?,?,?,?,?)");
   if (!statement.ok()) return statement.status();
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   statement->Bind(0, static_cast<std::int64_t>(
@@ -100,7 +145,49 @@ absl::Status Audit(SqliteDatabase& database, const AnnotationChange& change) {
   statement->Bind(3, change.id);
   statement->Bind(4, change.request_id);
   statement->Bind(5, change.description);
+  statement->Bind(6, change.person_id);
   return statement->Run();
+}
+
+bool AllFinite(const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(),
+                     [](double number) { return std::isfinite(number); });
+}
+
+Eigen::Matrix3d Symmetric(const std::vector<double>& c) {
+  Eigen::Matrix3d matrix;
+  matrix << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+  return matrix;
+}
+
+/// What version 2 added. False: it makes no sense.
+bool ReadMark(const SqliteStatement& row, StoredAnnotation& stored) {
+  Annotation& annotation = stored.annotation;
+  annotation.author_person_id = row.Text(16);
+  annotation.locked = row.Int(17) != 0;
+  annotation.locked_by = row.Text(18);
+  const std::vector<double> rotation = row.Numbers(19), extent = row.Numbers(20),
+                            end = row.Numbers(24);
+  annotation.number = static_cast<std::uint32_t>(row.Int(21));
+  annotation.length_m = row.Double(22);
+  annotation.length_sigma_m = row.Double(23);
+  if (!AllFinite(rotation) || !AllFinite(extent) || !AllFinite(end)) return false;
+  if (rotation.size() == 4) {
+    annotation.world_from_mark.emplace(rotation[3], rotation[0], rotation[1], rotation[2]);
+    if (std::abs(annotation.world_from_mark->norm() - 1.0) > 1e-6) return false;
+  } else if (!rotation.empty()) {
+    return false;
+  }
+  if (annotation.shape == AnnotationShape::kBox) {
+    if (extent.size() != 3) return false;
+    annotation.extent_m = {extent[0], extent[1], extent[2]};
+    if (!(annotation.extent_m.minCoeff() > 0)) return false;
+  }
+  if (annotation.shape == AnnotationShape::kMeasure) {
+    if (end.size() != 6 || annotation.ink_offset_m.size() != 1) return false;
+    stored.end_covariance_in_world = Symmetric(end);
+  }
+  return annotation.shape != AnnotationShape::kPin || annotation.number > 0;
 }
 
 /// Nothing if the row makes no sense.
@@ -120,23 +207,23 @@ std::optional<StoredAnnotation> ReadRow(const SqliteStatement& row) {
   const std::vector<double> c = row.Numbers(13);
   const std::vector<double> ink = row.Numbers(14);
   stored.world_key = row.Text(15);
-  const auto finite = [](double number) { return std::isfinite(number); };
-  const bool shape_known = row.Int(1) >= 0 && row.Int(1) <= 3;
+  const bool shape_known = row.Int(1) >= 0 && row.Int(1) < kAnnotationShapes;
   const bool method_known = row.Int(8) >= 0 && row.Int(8) <= 4;
   if (annotation.id.empty() || !shape_known || !method_known || c.size() != 6 ||
       ink.size() % 3 != 0 || !anchor.point_in_world.allFinite() || !(annotation.size_m > 0) ||
-      !std::all_of(c.begin(), c.end(), finite) || !std::all_of(ink.begin(), ink.end(), finite)) {
+      !AllFinite(c) || !AllFinite(ink)) {
     return std::nullopt;
   }
   annotation.shape = static_cast<AnnotationShape>(row.Int(1));
   anchor.method = static_cast<AnchorMethod>(row.Int(8));
-  anchor.covariance_in_world << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+  anchor.covariance_in_world = Symmetric(c);
   InkStroke::Points points;
   points.reserve(ink.size() / 3);
   for (std::size_t i = 0; i < ink.size(); i += 3) {
     points.emplace_back(ink[i], ink[i + 1], ink[i + 2]);
   }
   annotation.ink_offset_m = std::move(points);
+  if (!ReadMark(row, stored)) return std::nullopt;
   return stored;
 }
 
@@ -180,7 +267,12 @@ absl::Status Migrate(SqliteDatabase& database, const std::string& file) {
 }
 
 absl::Status WriteChange(SqliteDatabase& database, const AnnotationChange& change) {
-  absl::Status status = change.after ? Upsert(database, *change.after) : Erase(database, change.id);
+  // What only a whole change can alter: a refinement is of the place alone.
+  absl::Status status;
+  if (change.kind != EditKind::kRefine) status = WriteParts(database, change);
+  if (!status.ok()) return status;
+  status = change.after ? Upsert(database, *change.after) : Erase(database, change.id);
+  if (status.ok() && change.kind != EditKind::kRefine) status = DropUnusedPictures(database);
   if (status.ok() && change.kind != EditKind::kRefine) status = Audit(database, change);
   return status;
 }
@@ -195,6 +287,12 @@ absl::StatusOr<StoredAnnotations> ReadAll(SqliteDatabase& database, const std::s
     if (!row.ok()) return row.status();
     if (!*row) break;
     std::optional<StoredAnnotation> stored = ReadRow(*rows);
+    const std::string picture = rows->Text(25);
+    if (stored) {
+      absl::StatusOr<bool> whole = ReadParts(database, picture, stored->annotation);
+      if (!whole.ok()) return whole.status();
+      if (!*whole) stored.reset();
+    }
     if (!stored) {
       return absl::DataLossError(absl::StrCat(file, ": the row of annotation '", rows->Text(0),
                                               "' makes no sense; remove it with: sqlite3 ", file,
@@ -203,6 +301,9 @@ absl::StatusOr<StoredAnnotations> ReadAll(SqliteDatabase& database, const std::s
     }
     all.annotations.push_back(*std::move(stored));
   }
+  const absl::StatusOr<std::uint32_t> last_pin = ReadLastPin(database);
+  if (!last_pin.ok()) return last_pin.status();
+  all.last_pin = *last_pin;
   const std::string prune = absl::StrCat(
       "DELETE FROM audit WHERE number <= (SELECT max(number) FROM audit) - ", kKeptAudit);
   if (absl::Status status = database.Execute(prune.c_str()); !status.ok()) return status;

@@ -9,7 +9,7 @@
 namespace saccade {
 
 /// Version of the tables that this program writes, kept in PRAGMA user_version.
-inline constexpr int kSchemaVersion = 1;
+inline constexpr int kSchemaVersion = 2;
 
 /// Creates the tables or brings older ones up to date, in one transaction. FailedPrecondition if a
 /// newer program wrote them; DataLoss if the file belongs to something else.

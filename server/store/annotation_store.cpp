@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "server/store/annotation_rows.hpp"
 #include "server/store/store_database.hpp"
@@ -22,7 +23,7 @@ namespace {
 constexpr std::chrono::seconds kLookAfter(1);
 
 struct Item {
-  std::optional<AnnotationChange> change;  // nothing: a barrier
+  std::vector<AnnotationChange> changes;  // none: a barrier
   AnnotationStore::Done done;
 };
 
@@ -100,7 +101,7 @@ class AnnotationStore::Impl {
   absl::Status CommitBatch(const std::deque<Item>& batch) {
     std::uint64_t last = 0;
     for (const Item& item : batch) {
-      if (item.change) last = std::max(last, item.change->sequence);
+      for (const AnnotationChange& change : item.changes) last = std::max(last, change.sequence);
     }
     if (last == 0) return absl::OkStatus();  // barriers only
     {
@@ -117,7 +118,9 @@ class AnnotationStore::Impl {
     SqliteDatabase& database = database_->connection();
     absl::Status status = database.Execute("BEGIN IMMEDIATE");
     for (auto item = batch.begin(); status.ok() && item != batch.end(); ++item) {
-      if (item->change) status = WriteChange(database, *item->change);
+      for (const AnnotationChange& change : item->changes) {
+        if (status.ok()) status = WriteChange(database, change);
+      }
     }
     if (status.ok()) status = database.Execute("COMMIT");
     if (!status.ok() && database.InTransaction()) database.Execute("ROLLBACK").IgnoreError();
@@ -163,12 +166,12 @@ AnnotationStore::~AnnotationStore() = default;
 
 absl::StatusOr<StoredAnnotations> AnnotationStore::LoadAll() { return impl_->LoadAll(); }
 
-absl::Status AnnotationStore::Submit(AnnotationChange change, Done done) {
-  return impl_->Enqueue({std::move(change), std::move(done)});
+absl::Status AnnotationStore::SubmitAll(std::vector<AnnotationChange> changes, Done done) {
+  return impl_->Enqueue({std::move(changes), std::move(done)});
 }
 
 absl::Status AnnotationStore::SubmitBarrier(Done done) {
-  return impl_->Enqueue({std::nullopt, std::move(done)});
+  return impl_->Enqueue({{}, std::move(done)});
 }
 
 std::uint64_t AnnotationStore::committed_sequence() const { return impl_->committed(); }

@@ -46,7 +46,7 @@ class AnnotationStore final : public AnnotationJournal {
 
   // Answers come on the commit thread.
   absl::StatusOr<StoredAnnotations> LoadAll() override;
-  absl::Status Submit(AnnotationChange change, Done done) override;
+  absl::Status SubmitAll(std::vector<AnnotationChange> changes, Done done) override;
   absl::Status SubmitBarrier(Done done) override;
   std::uint64_t committed_sequence() const override;
   absl::Status failure() const override;

@@ -31,6 +31,10 @@ void SqliteStatement::Bind(int parameter, const std::vector<double>& numbers) {
   sqlite3_bind_blob(statement_, parameter + 1, data,
                     static_cast<int>(numbers.size() * sizeof(double)), SQLITE_TRANSIENT);
 }
+void SqliteStatement::BindBytes(int parameter, std::string_view bytes) {
+  sqlite3_bind_blob(statement_, parameter + 1, bytes.empty() ? "" : bytes.data(),
+                    static_cast<int>(bytes.size()), SQLITE_TRANSIENT);
+}
 
 absl::StatusOr<bool> SqliteStatement::Step() {
   const int code = sqlite3_step(statement_);
@@ -67,6 +71,10 @@ std::vector<double> SqliteStatement::Numbers(int column) const {
   std::vector<double> numbers(sqlite3_column_bytes(statement_, column) / sizeof(double));
   if (!numbers.empty()) std::memcpy(numbers.data(), data, numbers.size() * sizeof(double));
   return numbers;
+}
+std::string SqliteStatement::Bytes(int column) const {
+  const auto* data = static_cast<const char*>(sqlite3_column_blob(statement_, column));
+  return data ? std::string(data, sqlite3_column_bytes(statement_, column)) : std::string();
 }
 
 absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::Open(

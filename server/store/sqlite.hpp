@@ -29,6 +29,7 @@ class SqliteStatement {
   void Bind(int parameter, double value);
   void Bind(int parameter, std::string_view text);
   void Bind(int parameter, const std::vector<double>& numbers);  // as a blob, little endian
+  void BindBytes(int parameter, std::string_view bytes);         // as a blob
 
   /// True if there is a row, false at the end.
   absl::StatusOr<bool> Step();
@@ -39,6 +40,7 @@ class SqliteStatement {
   double Double(int column) const;
   std::string Text(int column) const;
   std::vector<double> Numbers(int column) const;
+  std::string Bytes(int column) const;
 
  private:
   sqlite3_stmt* statement_;

@@ -11,6 +11,9 @@ absl::StatusOr<std::unique_ptr<Wearable>> Wearable::Create(
     std::unique_ptr<AnnotationJournal> journal, std::function<void()> wake) {
   if (source.target && anchors.world_key.empty()) anchors.world_key = WorldKey(*source.target);
   std::unique_ptr<Wearable> wearable(new Wearable(source, std::move(tracker)));
+  wearable->pointers_ = std::make_unique<PointerPlacer>(
+      [ring = &wearable->ring_](FrameId id) { return ring->Find(id, FrameRing::Want::kPose); },
+      anchors);
   absl::StatusOr<std::unique_ptr<AnnotationBook>> book = AnnotationBook::Open(
       std::move(anchors),
       [ring = &wearable->ring_](FrameId id) { return ring->Find(id, FrameRing::Want::kGrey); },
@@ -35,6 +38,7 @@ const WearableStep& Wearable::Step(Frame frame) {
   step.snapshot = tracker_->Track(*step.frame);
   step.cost = meter.Read(step.snapshot->stage_ms.waited_ms);
   ring_.Push({step.frame, step.snapshot});
+  pointers_->OnSnapshot(step.snapshot);
   step.moved = book_->OnSnapshot(step.snapshot, *step.frame->camera);
   return newest_.emplace(std::move(step));
 }
@@ -58,17 +62,19 @@ void Wearable::Execute(Command command) {
       [this](auto& one) {
         using T = std::decay_t<decltype(one)>;
         if constexpr (std::is_same_v<T, CreateAnnotation>) {
-          book_->Create(one.draft, one.owner, one.done);
+          book_->Create(one.draft, one.editor, one.done);
         } else if constexpr (std::is_same_v<T, UpdateAnnotation>) {
-          book_->Update(one.patch, one.owner, one.done);
+          book_->Update(one.patch, one.editor, one.done);
         } else if constexpr (std::is_same_v<T, DeleteAnnotation>) {
-          book_->Delete(one.id, one.owner, [done = one.done](const absl::StatusOr<Annotation>& a) {
+          book_->Delete(one.id, one.editor, [done = one.done](const absl::StatusOr<Annotation>& a) {
             done(a.status());
           });
+        } else if constexpr (std::is_same_v<T, TickItem>) {
+          book_->Tick(one.id, one.index, one.ticked, one.editor, one.done);
         } else if constexpr (std::is_same_v<T, UndoChange>) {
-          one.redo ? book_->Redo(one.owner, one.done) : book_->Undo(one.owner, one.done);
-        } else if constexpr (std::is_same_v<T, ForgetSession>) {
-          book_->ForgetSession(one.owner);
+          one.redo ? book_->Redo(one.editor, one.done) : book_->Undo(one.editor, one.done);
+        } else if constexpr (std::is_same_v<T, ForgetPerson>) {
+          book_->ForgetPerson(one.person_id);
           one.done(absl::OkStatus());
         } else {
           ResetTracker(one);
@@ -80,7 +86,10 @@ void Wearable::Execute(Command command) {
 void Wearable::ResetTracker(const ResetMap& command) {
   tracker_->Reset();
   // What readers see changes with the next frame; after the end of the source there is none.
-  if (newest_) newest_->snapshot = tracker_->Track(*newest_->frame);
+  if (newest_) {
+    newest_->snapshot = tracker_->Track(*newest_->frame);
+    pointers_->OnSnapshot(newest_->snapshot);
+  }
   command.done(newest_ ? newest_->snapshot->map_generation : 0);
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/anchors/annotation_book.hpp"
+#include "server/anchors/pointer_placer.hpp"
 #include "server/capture/frame_source.hpp"
 #include "server/gaze/gaze_loop.hpp"
 #include "server/pipeline/commands.hpp"
@@ -58,6 +59,7 @@ class Wearable {
 
   /// Any thread.
   FrameRing& ring() { return ring_; }
+  const PointerPlacer& pointers() const { return *pointers_; }
   /// Never null; empty after Close(). Any thread.
   std::shared_ptr<const AnnotationList> annotations() const;
   /// Waits until every change that was accepted is kept, at most `limit`. Any thread, also while
@@ -74,6 +76,7 @@ class Wearable {
   const bool upright_;  // the target's frame is the world's, and knows where down is
   const std::unique_ptr<FrameTracker> tracker_;
   FrameRing ring_;
+  std::unique_ptr<PointerPlacer> pointers_;
   std::unique_ptr<AnnotationBook> book_;      // the caller's thread, but for Latest()
   mutable std::timed_mutex book_gone_mutex_;  // held to throw book_ away, and to read it elsewhere
   std::optional<WearableStep> newest_;

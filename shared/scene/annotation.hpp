@@ -17,7 +17,25 @@
 
 namespace saccade {
 
-enum class AnnotationShape { kCube, kNote, kArrow, kInk };
+enum class AnnotationShape {
+  kCube,
+  kNote,
+  kArrow,
+  kInk,
+  kBox,
+  kMeasure,
+  kPin,
+  kPicture,
+  kCheckList,
+};
+inline constexpr int kAnnotationShapes = 9;
+
+/// "cube", "check list": how messages name it.
+inline const char* ToString(AnnotationShape shape) {
+  constexpr const char* kNames[kAnnotationShapes] = {
+      "cube", "note", "arrow", "ink", "box", "measure", "pin", "picture", "check list"};
+  return kNames[static_cast<int>(shape)];
+}
 
 /// Slam-spec section 9; semantics of ARCore's TRACKING / PAUSED / STOPPED.
 enum class AnchorState { kProvisional, kTracking, kPaused, kStopped };
@@ -38,18 +56,6 @@ struct RayTarget {
   Eigen::Vector3d direction_in_world = Eigen::Vector3d::UnitZ();  // any length > 0
 };
 using AnnotationTarget = std::variant<PixelTarget, FeatureTarget, PointTarget, RayTarget>;
-
-/// A request to place something, already validated (finite numbers, known shape).
-struct AnnotationDraft {
-  std::string request_id;  // UUID of the caller; a repeated one answers with the first result
-  AnnotationShape shape = AnnotationShape::kCube;
-  std::string text;
-  std::string author;
-  double size_m = 0.05;
-  std::uint32_t color_rgba = 0xffffffff;
-  AnnotationTarget target;
-  std::vector<Eigen::Vector2d> ink_px;  // kInk: stroke in the target's frame [px]
-};
 
 /// How a click became a point: slam-spec section 9, in order of preference.
 enum class AnchorMethod { kScene, kFeature, kPlane, kMedianDepth, kPoint };
@@ -111,18 +117,70 @@ class InkStroke {
   std::shared_ptr<const Made> made_;  // null: no point
 };
 
+/// One line of a check list.
+struct CheckItem {
+  std::string text;
+  bool done = false;
+  std::string done_by;  // the name of who ticked it; empty: nobody
+  std::int64_t done_unix_ns = 0;
+
+  bool operator==(const CheckItem&) const = default;
+};
+/// Never changed once made, so that copies of an annotation share them.
+using CheckItems = std::shared_ptr<const std::vector<CheckItem>>;
+
+/// A PNG or JPEG, checked: its size is what its header says, and it can be decoded.
+struct Picture {
+  std::string sha256;         // of `bytes`, 64 hexadecimal digits
+  std::string media_type;     // "image/png" or "image/jpeg"
+  int width = 0, height = 0;  // [px]
+  std::string bytes;          // empty: with a client, which asks for them on their own
+};
+using PicturePtr = std::shared_ptr<const Picture>;
+
 struct Annotation {
   std::string id;  // UUID, outlives the session
   AnnotationShape shape = AnnotationShape::kCube;
   std::string text;
   std::string author;
+  std::string author_person_id;  // UUID; empty: made before persons were known
   double size_m = 0.05;
   std::uint32_t color_rgba = 0xffffffff;
   std::int64_t created_unix_ns = 0;
   std::uint64_t revision = 0;  // rises with each edit
   Anchor anchor;
-  /// kInk: the stroke relative to the anchor, axes parallel to world [m].
+  /// kInk: the stroke relative to the anchor, axes parallel to world; kMeasure: one point, its
+  /// other end, which the map carries as it carries the anchor [m].
   InkStroke ink_offset_m;
+
+  bool locked = false;    // only its author and a wearer change or delete it, or unlock it
+  std::string locked_by;  // the name of who did
+  std::optional<Eigen::Quaterniond> world_from_mark;   // kArrow, kBox; absent: parallel to world
+  Eigen::Vector3d extent_m = Eigen::Vector3d::Zero();  // kBox: its edges along its own axes
+  std::uint32_t number = 0;                            // kPin: from 1
+  double length_m = 0, length_sigma_m = 0;             // kMeasure
+  PicturePtr picture;                                  // kPicture; null otherwise
+  CheckItems check_items;                              // kCheckList; null otherwise
+};
+
+/// A request to place something, already validated (finite numbers, known shape).
+struct AnnotationDraft {
+  std::string request_id;  // UUID of the caller; a repeated one answers with the first result
+  AnnotationShape shape = AnnotationShape::kCube;
+  std::string text;
+  std::string author;
+  double size_m = 0.05;
+  std::uint32_t color_rgba = 0xffffffff;
+  AnnotationTarget target;
+  std::vector<Eigen::Vector2d> ink_px;  // kInk: stroke in the target's frame [px]
+  /// kInk without ink_px: the stroke relative to the target, axes parallel to world [m]. kMeasure
+  /// without end_target: one point.
+  InkStroke ink_offset_m;
+  std::optional<AnnotationTarget> end_target;         // kMeasure
+  std::optional<Eigen::Quaterniond> world_from_mark;  // kArrow, kBox; unit
+  std::optional<Eigen::Vector3d> extent_m;            // kBox; absent: size_m each
+  PicturePtr picture;                                 // kPicture
+  std::vector<std::string> check_items;               // kCheckList
 };
 
 /// The order of lists: oldest first. Strict also between annotations of the same nanosecond.
@@ -137,7 +195,26 @@ struct AnnotationPatch {
   std::optional<std::string> text;
   std::optional<double> size_m;
   std::optional<std::uint32_t> color_rgba;
-  std::optional<AnnotationTarget> target;  // set: move it there
+  std::optional<AnnotationTarget> target;      // set: move it there
+  std::optional<AnnotationTarget> end_target;  // kMeasure: move its other end there
+  std::optional<bool> locked;
+  std::optional<Eigen::Quaterniond> world_from_mark;  // kArrow, kBox; unit
+  std::optional<Eigen::Vector3d> extent_m;            // kBox
+};
+
+/// Who edits.
+struct Editor {
+  Editor() = default;
+  /// One who is known by no more than an id.
+  Editor(std::string id)  // NOLINT(google-explicit-constructor)
+      : person_id(id), participant_id(std::move(id)) {}
+  Editor(const char* id) : Editor(std::string(id)) {}  // NOLINT(google-explicit-constructor)
+
+  std::string person_id;       // UUID: whose authorship and whose undo it is
+  std::string participant_id;  // UUID of the session
+  std::string name;            // as others see it
+  bool wearer = false;         // whose locks hold nobody up
+  std::string edit_group;  // edits of one session with the same one, not empty, are undone together
 };
 
 /// An anchor jumped by more than 2 cm (slam-spec section 9).

@@ -13,6 +13,16 @@ inline constexpr double kMaxCoordinateM = 1e4;
 inline constexpr double kMaxSizeM = 10.0;
 /// Of a note's text, UTF-8.
 inline constexpr std::size_t kMaxTextBytes = 500;
+/// Of a picture's file [bytes], and of each side [px].
+inline constexpr std::size_t kMaxPictureBytes = 1 << 20;
+inline constexpr int kMaxPictureSide = 4096;
+/// Of a check list, and of one of its lines, UTF-8.
+inline constexpr std::size_t kMaxCheckItems = 30;
+inline constexpr std::size_t kMaxCheckItemBytes = 100;
+/// Of the word that joins edits for undo.
+inline constexpr std::size_t kMaxEditGroupBytes = 64;
+/// Of what one pointing call brings.
+inline constexpr std::size_t kMaxPointerPoints = 64;
 /// Of one stroke.
 inline constexpr std::size_t kMaxInkPoints = 2000;
 

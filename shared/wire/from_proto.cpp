@@ -17,44 +17,12 @@ absl::Status CheckFinite(double value, absl::string_view field, absl::string_vie
   return Bad(absl::StrCat(field, ".", part), "must be a finite number");
 }
 
-absl::StatusOr<Eigen::Vector2d> PixelFromProto(const v1::Pixel& message, const ImageSize& image,
-                                               absl::string_view field) {
-  const Eigen::Vector2d pixel(message.u(), message.v());
-  const int size[2] = {image.width, image.height};
-  const char* const part[2] = {"u", "v"};
-  for (int i = 0; i < 2; ++i) {
-    if (absl::Status s = CheckFinite(pixel[i], field, part[i]); !s.ok()) return s;
-    // Half a pixel beyond the centres of the outermost pixels is still the picture.
-    if (pixel[i] < -0.5 || pixel[i] > size[i] - 0.5) {
-      return Bad(absl::StrCat(field, ".", part[i]),
-                 absl::StrCat(pixel[i], " is outside the picture (-0.5 to ", size[i] - 0.5, ")"));
-    }
-  }
-  return pixel;
-}
-
-absl::StatusOr<AnnotationShape> ShapeFromProto(v1::AnnotationShape shape, absl::string_view field) {
-  switch (shape) {
-    case v1::ANNOTATION_SHAPE_CUBE:
-      return AnnotationShape::kCube;
-    case v1::ANNOTATION_SHAPE_NOTE:
-      return AnnotationShape::kNote;
-    case v1::ANNOTATION_SHAPE_ARROW:
-      return AnnotationShape::kArrow;
-    case v1::ANNOTATION_SHAPE_INK:
-      return AnnotationShape::kInk;
-    default:
-      return Bad(field, absl::StrCat("unknown shape ", static_cast<int>(shape),
-                                     ": use CUBE, NOTE, ARROW or INK"));
-  }
-}
-
 absl::StatusOr<AnnotationTarget> PixelTargetFromProto(const v1::FramePixel& message,
                                                       const ImageSize& image,
                                                       absl::string_view field) {
   if (!message.has_pixel()) return Bad(absl::StrCat(field, ".pixel"), "is missing");
   absl::StatusOr<Eigen::Vector2d> pixel =
-      PixelFromProto(message.pixel(), image, absl::StrCat(field, ".pixel"));
+      FromProto(message.pixel(), image, absl::StrCat(field, ".pixel"));
   if (!pixel.ok()) return pixel.status();
   return PixelTarget{message.frame_id(), *pixel};
 }
@@ -71,23 +39,23 @@ absl::StatusOr<AnnotationTarget> RayFromProto(const v1::Ray& message, absl::stri
   return RayTarget{*origin, *direction};
 }
 
-absl::Status CheckInk(const v1::AnnotationDraft& message, absl::string_view field) {
-  const std::string ink = absl::StrCat(field, ".ink_px");
-  if (message.shape() != v1::ANNOTATION_SHAPE_INK) {
-    return message.ink_px().empty() ? absl::OkStatus() : Bad(ink, "only an INK shape has a stroke");
-  }
-  if (message.ink_px_size() < 2) return Bad(ink, "a stroke has at least 2 points");
-  if (static_cast<std::size_t>(message.ink_px_size()) > kMaxInkPoints) {
-    return Bad(ink,
-               absl::StrCat("at most ", kMaxInkPoints, " points, not ", message.ink_px_size()));
-  }
-  if (!message.target().has_frame_pixel()) {
-    return Bad(absl::StrCat(field, ".target"), "an INK shape needs a frame_pixel");
-  }
-  return absl::OkStatus();
-}
-
 }  // namespace
+
+absl::StatusOr<Eigen::Vector2d> FromProto(const v1::Pixel& message, const ImageSize& image,
+                                          absl::string_view field) {
+  const Eigen::Vector2d pixel(message.u(), message.v());
+  const int size[2] = {image.width, image.height};
+  const char* const part[2] = {"u", "v"};
+  for (int i = 0; i < 2; ++i) {
+    if (absl::Status s = CheckFinite(pixel[i], field, part[i]); !s.ok()) return s;
+    // Half a pixel beyond the centres of the outermost pixels is still the picture.
+    if (pixel[i] < -0.5 || pixel[i] > size[i] - 0.5) {
+      return Bad(absl::StrCat(field, ".", part[i]),
+                 absl::StrCat(pixel[i], " is outside the picture (-0.5 to ", size[i] - 0.5, ")"));
+    }
+  }
+  return pixel;
+}
 
 absl::StatusOr<Eigen::Vector3d> FromProto(const v1::Vector3& message, absl::string_view field) {
   const Eigen::Vector3d value(message.x(), message.y(), message.z());
@@ -122,34 +90,6 @@ absl::StatusOr<AnnotationTarget> FromProto(const v1::AnnotationTarget& message,
       break;
   }
   return Bad(field, "is missing: give frame_pixel, feature_id, point_in_world_m or ray");
-}
-
-absl::StatusOr<AnnotationDraft> FromProto(const v1::AnnotationDraft& message,
-                                          const ImageSize& image, absl::string_view field) {
-  AnnotationDraft draft;
-  absl::StatusOr<AnnotationShape> shape =
-      ShapeFromProto(message.shape(), absl::StrCat(field, ".shape"));
-  if (!shape.ok()) return shape.status();
-  draft.shape = *shape;
-  absl::Status text = CheckText(message.text(), kMaxTextBytes, absl::StrCat(field, ".text"));
-  if (!text.ok()) return text;
-  draft.text = message.text();
-  absl::StatusOr<double> size = CheckSize(message.size_m(), absl::StrCat(field, ".size_m"));
-  if (!size.ok()) return size.status();
-  draft.size_m = *size;
-  if (message.color_rgba() != 0) draft.color_rgba = message.color_rgba();
-  absl::StatusOr<AnnotationTarget> target =
-      FromProto(message.target(), image, absl::StrCat(field, ".target"));
-  if (!target.ok()) return target.status();
-  draft.target = *target;
-  if (absl::Status ink = CheckInk(message, field); !ink.ok()) return ink;
-  for (int i = 0; i < message.ink_px_size(); ++i) {
-    absl::StatusOr<Eigen::Vector2d> pixel =
-        PixelFromProto(message.ink_px(i), image, absl::StrCat(field, ".ink_px[", i, "]"));
-    if (!pixel.ok()) return pixel.status();
-    draft.ink_px.push_back(*pixel);
-  }
-  return draft;
 }
 
 absl::StatusOr<double> CheckSize(double size_m, absl::string_view field) {

@@ -31,6 +31,12 @@ inline constexpr double kDefaultSizeM = 0.05;
 inline constexpr std::size_t kMaxNameBytes = 60;
 
 absl::StatusOr<Eigen::Vector3d> FromProto(const v1::Vector3& message, absl::string_view field);
+/// To half a pixel beyond the centres of the outermost pixels.
+absl::StatusOr<Eigen::Vector2d> FromProto(const v1::Pixel& message, const ImageSize& image,
+                                          absl::string_view field);
+/// Of length 1 to a thousandth, which the result has exactly.
+absl::StatusOr<Eigen::Quaterniond> FromProto(const v1::Quaternion& message,
+                                             absl::string_view field);
 absl::StatusOr<Rigid3> FromProto(const v1::Rigid3& message, absl::string_view field);
 absl::StatusOr<Eigen::Matrix3d> FromProto(const v1::Covariance3& message, absl::string_view field);
 absl::StatusOr<Matrix6d> FromProto(const v1::Covariance6& message, absl::string_view field);
@@ -39,10 +45,21 @@ absl::StatusOr<CameraIntrinsics> FromProto(const v1::CameraIntrinsics& message,
 
 absl::StatusOr<AnnotationTarget> FromProto(const v1::AnnotationTarget& message,
                                            const ImageSize& image, absl::string_view field);
-/// The draft's defaults filled in; request_id and author are the caller's to set.
+/// The draft's defaults filled in; request_id, author and picture are the caller's to set: what the
+/// bytes of a picture are, only who decodes them knows. Here it is that there are some, and not too
+/// many.
 absl::StatusOr<AnnotationDraft> FromProto(const v1::AnnotationDraft& message,
                                           const ImageSize& image,
                                           absl::string_view field = "draft");
+
+/// What is to be changed, with `id`. The rest of the request is the caller's.
+absl::StatusOr<AnnotationPatch> FromProto(const v1::UpdateAnnotationRequest& message,
+                                          const ImageSize& image);
+
+/// Edges above 0 and at most kMaxSizeM [m].
+absl::StatusOr<Eigen::Vector3d> CheckExtent(const v1::Vector3& message, absl::string_view field);
+/// Of edits that are undone together: at most kMaxEditGroupBytes of UTF-8, one line.
+absl::Status CheckEditGroup(absl::string_view group);
 
 /// 0 becomes kDefaultSizeM.
 absl::StatusOr<double> CheckSize(double size_m, absl::string_view field);

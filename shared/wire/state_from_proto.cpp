@@ -108,13 +108,18 @@ absl::StatusOr<Rigid3> FromProto(const v1::Rigid3& message, absl::string_view fi
   absl::StatusOr<Eigen::Vector3d> translation =
       FromProto(message.translation_m(), absl::StrCat(field, ".translation_m"));
   if (!translation.ok()) return translation.status();
-  const v1::Quaternion& q = message.rotation();
-  const Eigen::Quaterniond rotation(q.w(), q.x(), q.y(), q.z());
+  const absl::StatusOr<Eigen::Quaterniond> rotation =
+      FromProto(message.rotation(), absl::StrCat(field, ".rotation"));
+  if (!rotation.ok()) return rotation.status();
+  return Rigid3{*rotation, *translation};
+}
+
+absl::StatusOr<Eigen::Quaterniond> FromProto(const v1::Quaternion& message,
+                                             absl::string_view field) {
+  const Eigen::Quaterniond rotation(message.w(), message.x(), message.y(), message.z());
   // Not >: NaN fails too.
-  if (!(std::abs(rotation.norm() - 1.0) < 1e-3)) {
-    return Bad(absl::StrCat(field, ".rotation"), "must be a unit quaternion");
-  }
-  return Rigid3{rotation.normalized(), *translation};
+  if (!(std::abs(rotation.norm() - 1.0) < 1e-3)) return Bad(field, "must be a unit quaternion");
+  return rotation.normalized();
 }
 
 absl::StatusOr<CameraIntrinsics> FromProto(const v1::CameraIntrinsics& message,
@@ -236,42 +241,6 @@ absl::StatusOr<Anchor> FromProto(const v1::Anchor& message, absl::string_view fi
   if (message.has_error_px()) out.error_px = message.error_px();
   if (message.has_pixel()) out.pixel = Eigen::Vector2d(message.pixel().u(), message.pixel().v());
   out.reason = message.reason();
-  return out;
-}
-
-absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string_view field) {
-  Annotation out;
-  out.id = message.id();
-  switch (message.shape()) {
-    case v1::ANNOTATION_SHAPE_NOTE:
-      out.shape = AnnotationShape::kNote;
-      break;
-    case v1::ANNOTATION_SHAPE_ARROW:
-      out.shape = AnnotationShape::kArrow;
-      break;
-    case v1::ANNOTATION_SHAPE_INK:
-      out.shape = AnnotationShape::kInk;
-      break;
-    default:
-      out.shape = AnnotationShape::kCube;  // a shape of a newer server is still shown
-  }
-  out.text = message.text();
-  out.author = message.author();
-  out.size_m = message.size_m();
-  out.color_rgba = message.color_rgba();
-  out.created_unix_ns = message.created_unix_ns();
-  out.revision = message.revision();
-  absl::StatusOr<Anchor> anchor = FromProto(message.anchor(), absl::StrCat(field, ".anchor"));
-  if (!anchor.ok()) return anchor.status();
-  out.anchor = *std::move(anchor);
-  InkStroke::Points ink;
-  ink.reserve(static_cast<std::size_t>(message.ink_offset_m_size()));
-  for (const v1::Vector3& offset : message.ink_offset_m()) {
-    absl::StatusOr<Eigen::Vector3d> one = FromProto(offset, absl::StrCat(field, ".ink_offset_m"));
-    if (!one.ok()) return one.status();
-    ink.push_back(*one);
-  }
-  out.ink_offset_m = std::move(ink);
   return out;
 }
 

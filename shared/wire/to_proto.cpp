@@ -186,20 +186,6 @@ v1::Feature ToProto(const FeatureSnapshot& feature) {
   return message;
 }
 
-v1::AnnotationShape ToProto(AnnotationShape shape) {
-  switch (shape) {
-    case AnnotationShape::kCube:
-      return v1::ANNOTATION_SHAPE_CUBE;
-    case AnnotationShape::kNote:
-      return v1::ANNOTATION_SHAPE_NOTE;
-    case AnnotationShape::kArrow:
-      return v1::ANNOTATION_SHAPE_ARROW;
-    case AnnotationShape::kInk:
-      return v1::ANNOTATION_SHAPE_INK;
-  }
-  return v1::ANNOTATION_SHAPE_UNSPECIFIED;
-}
-
 v1::PoseEvent ToProtoPose(const MapSnapshot& snapshot, Timestamp captured_ns) {
   v1::PoseEvent message;
   message.set_frame_id(snapshot.frame_id);
@@ -250,40 +236,6 @@ v1::FrameFeatures ToProtoFeatures(const MapSnapshot& snapshot) {
       message.add_failed_px16(u);
       message.add_failed_px16(v);
     }
-  }
-  return message;
-}
-
-v1::Annotation ToProto(const Annotation& annotation) {
-  v1::Annotation message;
-  message.set_id(annotation.id);
-  message.set_shape(ToProto(annotation.shape));
-  message.set_text(annotation.text);
-  message.set_author(annotation.author);
-  message.set_size_m(annotation.size_m);
-  message.set_color_rgba(annotation.color_rgba);
-  message.set_created_unix_ns(annotation.created_unix_ns);
-  message.set_revision(annotation.revision);
-  *message.mutable_anchor() = ToProto(annotation.anchor);
-  message.mutable_ink_offset_m()->Reserve(static_cast<int>(annotation.ink_offset_m.size()));
-  for (const Eigen::Vector3d& offset : annotation.ink_offset_m) {
-    *message.add_ink_offset_m() = ToProto(offset);
-  }
-  return message;
-}
-
-v1::AnnotationTarget ToProto(const AnnotationTarget& target) {
-  v1::AnnotationTarget message;
-  if (const auto* pixel = std::get_if<PixelTarget>(&target)) {
-    message.mutable_frame_pixel()->set_frame_id(pixel->frame_id);
-    *message.mutable_frame_pixel()->mutable_pixel() = ToProto(pixel->pixel);
-  } else if (const auto* feature = std::get_if<FeatureTarget>(&target)) {
-    message.set_feature_id(feature->feature_id);
-  } else if (const auto* point = std::get_if<PointTarget>(&target)) {
-    *message.mutable_point_in_world_m() = ToProto(point->point_in_world);
-  } else if (const auto* ray = std::get_if<RayTarget>(&target)) {
-    *message.mutable_ray()->mutable_origin_in_world_m() = ToProto(ray->origin_in_world);
-    *message.mutable_ray()->mutable_direction_in_world() = ToProto(ray->direction_in_world);
   }
   return message;
 }

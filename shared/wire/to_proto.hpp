@@ -33,6 +33,8 @@ v1::FrameFeatures ToProtoFeatures(const MapSnapshot& snapshot);
 
 v1::Anchor ToProto(const Anchor& anchor);
 v1::Annotation ToProto(const Annotation& annotation);
+/// Without its bytes.
+v1::PictureFacts ToProto(const Picture& picture);
 
 /// A target as a client asks for it.
 v1::AnnotationTarget ToProto(const AnnotationTarget& target);

@@ -20,7 +20,7 @@ constexpr auto kServerOrder = std::to_array<string_view>(
      "store",    "identity", "rpc",     "wear",    "gateway",  "eval",     "app"});
 constexpr auto kClientOrder = std::to_array<string_view>({"net", "cli"});
 constexpr auto kSharedOrder = std::to_array<string_view>(
-    {"version", "io", "geometry", "time", "camera", "scene", "wire", "render"});
+    {"version", "io", "geometry", "time", "camera", "scene", "marks", "wire", "render"});
 
 // Folders that see less than what is above them: only snapshots, packets and commands.
 struct Restriction {

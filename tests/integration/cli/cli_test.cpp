@@ -225,6 +225,42 @@ TEST_F(CommandLine, UndoUnderAnotherNameLeavesOnesOwnMarks) {
   }
 }
 
+TEST_F(CommandLine, EveryShapeIsPlacedAndShown) {
+  const auto place = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(),
+                     {"annotate", "--json", "--point", "0.1,0.1,1.5", "--shape"});
+    const RunResult placed = Run(arguments);
+    EXPECT_EQ(placed.exit_code, 0) << placed.err;
+    return json::parse(placed.out, nullptr, false);
+  };
+  const json box = place({"box", "--extent", "0.1,0.2,0.3", "--rotation", "0,1,0,0"});
+  EXPECT_EQ(box["extent_m"][1], 0.2);
+  const json measure = place({"measure", "--to-point", "0.1,0.1,1.9"});
+  EXPECT_NEAR(measure["length_m"].get<double>(), 0.4, 1e-6);
+  EXPECT_THAT(Run({"annotations", "show", measure["id"]}).out, HasSubstr("length"));
+  EXPECT_GE(place({"pin"})["number"].get<int>(), 1);
+  const std::string png = *folder_ / "pinned.png";
+  ASSERT_EQ(Run({"snapshot", "--view", "raw", "--out", png}).exit_code, 0);
+  const json picture = place({"picture", "--picture", png});
+  EXPECT_EQ(picture["picture"]["media_type"], "image/png");
+  const std::string again = *folder_ / "again.png";
+  ASSERT_EQ(Run({"annotations", "picture", picture["id"], "--out", again}).exit_code, 0);
+  const auto bytes = [](const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  EXPECT_EQ(bytes(again), bytes(png));
+  const json list = place({"check-list", "--item", "oil", "--item", "lid"});
+  const RunResult ticked = Run({"annotations", "tick", list["id"], "2", "--json"});
+  ASSERT_EQ(ticked.exit_code, 0) << ticked.err;
+  EXPECT_EQ(json::parse(ticked.out)["check_items"][1]["done"], true);
+  EXPECT_EQ(json::parse(Run({"annotations", "lock", list["id"], "--json"}).out)["locked"], true);
+  ExpectFailure(Run({"--name", "Bob", "annotations", "delete", list["id"]}), "locked by");
+  for (const json& one : {box, measure, picture, list}) {
+    EXPECT_EQ(Run({"annotations", "delete", one["id"]}).exit_code, 0);
+  }
+}
+
 TEST_F(CommandLine, AMapWithoutScaleHasNoMillimetres) {
   const RunResult placed = Run({"annotate", "--point", "0.1,0.1,1.5", "--text", "größer"});
   ASSERT_EQ(placed.exit_code, 0) << placed.err;

@@ -14,6 +14,7 @@
 #include "saccade/v1/annotation.pb.h"
 #include "saccade/v1/gaze.pb.h"
 #include "saccade/v1/map.pb.h"
+#include "saccade/v1/pointer.pb.h"
 #include "saccade/v1/session.pb.h"
 #include "saccade/v1/wearer.pb.h"
 #include "tests/integration/identity/guarded_server.hpp"
@@ -51,6 +52,9 @@ const std::map<std::string, Least>& Promised() {
                                                     {"AnnotationService/Delete", kAnnotator},
                                                     {"AnnotationService/Undo", kAnnotator},
                                                     {"AnnotationService/Redo", kAnnotator},
+                                                    {"AnnotationService/TickCheckItem", kAnnotator},
+                                                    {"AnnotationService/GetPicture", kViewer},
+                                                    {"PointerService/Point", kAnnotator},
                                                     {"MapService/Get", kViewer},
                                                     {"MapService/Export", kViewer},
                                                     {"MapService/List", kViewer},
@@ -78,7 +82,8 @@ std::vector<const MethodDescriptor*> EveryMethod() {
   for (const auto* linked :
        {v1::GetAccessRequest::descriptor(), v1::JoinRequest::descriptor(),
         v1::ListAnnotationsRequest::descriptor(), v1::GetMapRequest::descriptor(),
-        v1::GetGazeStateRequest::descriptor(), v1::WearerHello::descriptor()}) {
+        v1::GetGazeStateRequest::descriptor(), v1::PointRequest::descriptor(),
+        v1::WearerHello::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

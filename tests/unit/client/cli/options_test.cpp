@@ -46,6 +46,21 @@ TEST(CommandLine, BadUsageEndsWithTwo) {
       {"annotate", "--pixel", "1,2", "--color", "orange"},
       {"annotate", "--pixel", "1,2", "--color", "0xff00"},
       {"annotate", "--pixel", "1,2", "--color", "ff9a3dff"},
+      {"annotate", "--pixel", "1,2", "--shape", "measure"},
+      {"annotate", "--pixel", "1,2", "--to-pixel", "3,4"},
+      {"annotate", "--pixel", "1,2", "--shape", "measure", "--to-pixel", "3"},
+      {"annotate", "--pixel", "1,2", "--shape", "box", "--extent", "1,2"},
+      {"annotate", "--pixel", "1,2", "--extent", "1,2,3"},
+      {"annotate", "--pixel", "1,2", "--shape", "pin", "--rotation", "0,0,0,1"},
+      {"annotate", "--pixel", "1,2", "--shape", "picture"},
+      {"annotate", "--pixel", "1,2", "--shape", "picture", "--picture", "/no/such/file"},
+      {"annotate", "--pixel", "1,2", "--shape", "check-list"},
+      {"annotate", "--pixel", "1,2", "--item", "oil"},
+      {"annotations", "tick", "6f1c"},
+      {"annotations", "tick", "6f1c", "0"},
+      {"annotations", "tick", "6f1c", "31"},
+      {"annotations", "lock"},
+      {"annotations", "picture", "6f1c"},
       {"snapshot", "--view", "raw"},
       {"snapshot", "--view", "rgb", "--out", "a.png"},
       {"annotations", "show"},
@@ -62,6 +77,28 @@ TEST(CommandLine, BadUsageEndsWithTwo) {
     EXPECT_FALSE(result.options) << line;
     EXPECT_EQ(result.exit_code, kBadUsage) << line;
   }
+}
+
+TEST(CommandLine, WhatOnlySomeShapesHaveIsTaken) {
+  const ParseResult box = Parse({"annotate", "--point", "0,0,1", "--shape", "box", "--extent",
+                                 "0.1,0.2,0.3", "--rotation", "0,1,0,0"});
+  ASSERT_TRUE(box.options);
+  EXPECT_EQ(box.options->draft.shape, AnnotationShape::kBox);
+  EXPECT_EQ(*box.options->draft.extent_m, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(box.options->draft.world_from_mark->y(), 1.0);
+  const ParseResult measure =
+      Parse({"annotate", "--pixel", "1,2", "--shape", "measure", "--to-feature", "9"});
+  ASSERT_TRUE(measure.options);
+  EXPECT_EQ(std::get<FeatureTarget>(*measure.options->draft.end_target).feature_id, 9u);
+  const ParseResult list = Parse({"annotate", "--point", "0,0,1", "--shape", "check-list", "--item",
+                                  "oil", "--item", "close the lid"});
+  ASSERT_TRUE(list.options);
+  EXPECT_EQ(list.options->draft.check_items, (std::vector<std::string>{"oil", "close the lid"}));
+  const ParseResult tick = Parse({"annotations", "tick", "6f1c", "2", "--undone"});
+  ASSERT_TRUE(tick.options);
+  EXPECT_EQ(tick.options->command, Command::kTick);
+  EXPECT_EQ(tick.options->line, 2u);
+  EXPECT_TRUE(tick.options->untick);
 }
 
 TEST(CommandLine, TargetsOfAnAnnotationAreTaken) {

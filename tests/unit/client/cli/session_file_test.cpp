@@ -76,5 +76,28 @@ TEST_F(SessionFile, NeitherLinksNorPipesNorHalvesAreRead) {
   EXPECT_EQ(LoadSession("s:1", "Ann"), "");
 }
 
+TEST_F(SessionFile, APersonsKeyIsMadeOnceForServerAndNameAndForItsUserAlone) {
+  const std::string key = PersonKey("s:1", "Ann");
+  EXPECT_EQ(key.size(), 43u);
+  EXPECT_EQ(
+      key.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"),
+      key.npos);
+  EXPECT_EQ(PersonKey("s:1", "Ann"), key);
+  EXPECT_NE(PersonKey("s:1", "Bob"), key);
+  EXPECT_NE(PersonKey("s:2", "Ann"), key) << "no server is told another's";
+  const std::string path = PersonFilePath("s:1", "Ann");
+  EXPECT_EQ(Mode(path), 0600u);
+  chmod(path.c_str(), 0640);
+  const std::string anew = PersonKey("s:1", "Ann");
+  EXPECT_NE(anew, key) << "who knows who has read it";
+  EXPECT_EQ(Mode(path), 0600u);
+  unsetenv("XDG_STATE_HOME");
+  const char* home = std::getenv("HOME");
+  const std::string kept = home != nullptr ? home : "";
+  unsetenv("HOME");
+  EXPECT_EQ(PersonKey("s:1", "Ann"), "");
+  if (!kept.empty()) setenv("HOME", kept.c_str(), 1);
+}
+
 }  // namespace
 }  // namespace saccade::cli

@@ -50,7 +50,7 @@ void ExpectRefused(const absl::Status& status, const std::string& quota, const s
 
 TEST_F(Quotas, OneSessionLeavesRoomForTheOthers) {
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(Mark("a").ok());
-  ExpectRefused(Mark("a").status(), "quota of one session", "3 of 3 annotations",
+  ExpectRefused(Mark("a").status(), "quota of one person", "3 of 3 annotations",
                 "delete some of yours");
   const absl::StatusOr<AnnotationEdit> other = Mark("b");
   ASSERT_TRUE(other.ok()) << other.status();
@@ -66,7 +66,7 @@ TEST_F(Quotas, TheServerHoldsSoManyAnnotations) {
 
 TEST_F(Quotas, InkIsCountedInPoints) {
   ASSERT_TRUE(rig_.Draw(200, "a").ok());
-  ExpectRefused(rig_.Draw(101, "a").status(), "quota of one session", "200 of 300 points of ink",
+  ExpectRefused(rig_.Draw(101, "a").status(), "quota of one person", "200 of 300 points of ink",
                 "draw a shorter one");
   ASSERT_TRUE(rig_.Draw(100, "a").ok());
   ASSERT_TRUE(Mark("a").ok()) << "a mark without ink is not a stroke";

@@ -92,10 +92,10 @@ TEST_F(UndoMemory, AllSessionsTogetherAreBoundedAndTheOldestOfAllGoesFirst) {
   EXPECT_TRUE(manager().Undo("session 33").ok());
 }
 
-TEST_F(UndoMemory, ForgettingASessionGivesItsBytesBack) {
+TEST_F(UndoMemory, ForgettingAPersonGivesItsBytesBack) {
   Recolour(Stroke("a"), 10, "a");
   EXPECT_GT(manager().undo_bytes(), 48'000u);
-  manager().ForgetSession("a");
+  manager().ForgetPerson("a");
   EXPECT_EQ(manager().undo_bytes(), 0u);
   EXPECT_FALSE(manager().Undo("nobody").ok());
   EXPECT_EQ(manager().undo_bytes(), 0u);

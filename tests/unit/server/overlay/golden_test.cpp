@@ -7,9 +7,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 #include "tests/unit/server/anchors/synthetic_map.hpp"
 
 namespace saccade {
@@ -30,7 +31,8 @@ json Array(const Polyline2& line) {
 }
 
 const char* Name(AnnotationShape shape) {
-  static constexpr const char* kNames[] = {"cube", "note", "arrow", "ink"};
+  static constexpr const char* kNames[kAnnotationShapes] = {
+      "cube", "note", "arrow", "ink", "box", "measure", "pin", "picture", "check_list"};
   return kNames[static_cast<int>(shape)];
 }
 const char* Name(AnchorState state) {
@@ -83,6 +85,56 @@ std::vector<Rigid3> Poses() {
           testing::LookFrom({0.02, 0.05, 1.15}, 0.4, 0.1)};  // close, some of it behind
 }
 
+/// What marks.md defines.
+void AddShapes(std::vector<Annotation>& list) {
+  const auto add = [&list](AnnotationShape shape, const Eigen::Vector3d& point) -> Annotation& {
+    Annotation& one = list.emplace_back();
+    one.id = std::string("mark-") + std::to_string(list.size() - 1);
+    one.shape = shape;
+    one.anchor.state = AnchorState::kTracking;
+    one.anchor.point_in_world = point;
+    one.color_rgba = 0xd9b38cff;
+    return one;
+  };
+  const auto turn = [](double angle, double x, double y, double z) {
+    return Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(x, y, z).normalized()));
+  };
+  Annotation& arrow = add(AnnotationShape::kArrow, {-0.2, -0.1, 1.3});
+  arrow.world_from_mark = turn(1.1, 1, -2, 0.5);
+  arrow.size_m = 0.1;
+  Annotation& box = add(AnnotationShape::kBox, {0.2, -0.15, 1.5});
+  box.extent_m = {0.3, 0.1, 0.2};
+  box.world_from_mark = turn(0.6, 0, 1, 0.2);
+  box.text = "pump";
+  Annotation& straight = add(AnnotationShape::kBox, {-0.35, 0.25, 1.7});
+  straight.extent_m = {0.1, 0.15, 0.05};
+  straight.anchor.state = AnchorState::kPaused;
+  Annotation& across = add(AnnotationShape::kMeasure, {-0.15, 0.05, 1.4});
+  across.ink_offset_m = {{0.3, 0.06, 0.16}};
+  across.length_m = 0.3454;
+  across.length_sigma_m = 0.0042;
+  across.text = "shaft";
+  Annotation& upright = add(AnnotationShape::kMeasure, {0.3, 0.3, 1.6});
+  upright.ink_offset_m = {{0.01, -1.2, 0.02}};
+  upright.length_m = 1.2002;
+  upright.length_sigma_m = 0.0321;
+  Annotation& pin = add(AnnotationShape::kPin, {0.12, 0.22, 1.25});
+  pin.number = 17;
+  pin.size_m = 0.08;
+  pin.text = "leaks";
+  add(AnnotationShape::kPin, {-0.05, 0.1, 1.35}).number = 3;
+  Annotation& picture = add(AnnotationShape::kPicture, {-0.1, 0.3, 1.6});
+  picture.size_m = 0.3;
+  picture.picture = std::make_shared<Picture>(Picture{"", "image/png", 400, 250, ""});
+  picture.text = "page 12";
+  Annotation& tasks = add(AnnotationShape::kCheckList, {0.3, 0.05, 1.5});
+  tasks.text = "service";
+  tasks.check_items = std::make_shared<std::vector<CheckItem>>(
+      std::vector<CheckItem>{{"oil", true, "Bob", 1}, {"lid", false, "", 0}});
+  add(AnnotationShape::kCheckList, {-0.4, -0.05, 1.8}).check_items =
+      std::make_shared<std::vector<CheckItem>>(std::vector<CheckItem>{{"tidy up", false, "", 0}});
+}
+
 std::vector<Annotation> Annotations() {
   std::vector<Annotation> list(6);
   const Eigen::Vector3d points[] = {{0.05, 0.1, 1.2},  {-0.3, 0.05, 1.4}, {0.35, 0.2, 1.3},
@@ -108,6 +160,7 @@ std::vector<Annotation> Annotations() {
     ink.emplace_back(0.02 * k, 0.05 * std::sin(0.8 * k), 0.01 * k);
   }
   list[3].ink_offset_m = std::move(ink);
+  AddShapes(list);
   return list;
 }
 
@@ -139,6 +192,23 @@ json Describe(const std::vector<Annotation>& annotations) {
                     {"state", Name(a.anchor.state)},
                     {"point_in_world_m", Array(a.anchor.point_in_world)},
                     {"ink_offset_m", ink}});
+    json& entry = list.back();
+    if (const auto& q = a.world_from_mark) {
+      entry["world_from_mark"] = {q->x(), q->y(), q->z(), q->w()};
+    }
+    if (a.shape == AnnotationShape::kBox) entry["extent_m"] = Array(a.extent_m);
+    if (a.number > 0) entry["number"] = a.number;
+    if (a.length_m > 0) {
+      entry["length_m"] = a.length_m;
+      entry["length_sigma_m"] = a.length_sigma_m;
+    }
+    if (a.picture) {
+      entry["picture"] = {{"width", a.picture->width}, {"height", a.picture->height}};
+    }
+    if (!a.check_items) continue;
+    for (const CheckItem& item : *a.check_items) {
+      entry["check_items"].push_back({{"text", item.text}, {"done", item.done}});
+    }
   }
   return list;
 }

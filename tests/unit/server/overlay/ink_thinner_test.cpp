@@ -1,4 +1,4 @@
-#include "server/overlay/ink_thinner.hpp"
+#include "shared/marks/ink_thinner.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

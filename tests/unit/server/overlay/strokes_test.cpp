@@ -1,4 +1,4 @@
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -119,6 +119,34 @@ TEST_F(AnnotationParts, EstimatesOfSizeAreUpperBounds) {
   }
 }
 
+TEST_F(AnnotationParts, EstimatesHoldForEveryShape) {
+  for (int shape = 0; shape < kAnnotationShapes; ++shape) {
+    Annotation one = MakeStroke(3, shape == static_cast<int>(AnnotationShape::kMeasure) ? 1 : 0);
+    one.shape = static_cast<AnnotationShape>(shape);
+    one.author_person_id.assign(36, 'p');
+    one.author.assign(60, 'y');
+    one.created_unix_ns = std::numeric_limits<std::int64_t>::max();
+    one.revision = std::numeric_limits<std::uint64_t>::max();
+    one.locked = true;
+    if (one.shape == AnnotationShape::kBox || one.shape == AnnotationShape::kArrow) {
+      one.world_from_mark = Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5);
+    }
+    one.extent_m = {0.1, 0.2, 0.3};
+    if (one.shape == AnnotationShape::kPin) one.number = 0xffffffff;
+    if (one.shape == AnnotationShape::kMeasure) one.length_m = one.length_sigma_m = 0.1;
+    if (one.shape == AnnotationShape::kPicture) {
+      one.picture = std::make_shared<Picture>(
+          Picture{std::string(64, 'f'), "image/jpeg", 4096, 4096, std::string(1000, 'x')});
+    }
+    if (one.shape == AnnotationShape::kCheckList) {
+      one.check_items = std::make_shared<std::vector<CheckItem>>(
+          30, CheckItem{std::string(100, 't'), true, std::string(60, 'n'),
+                        std::numeric_limits<std::int64_t>::max()});
+    }
+    EXPECT_LE(wire::ToProto(one).ByteSizeLong(), EncodedBytes(one)) << ToString(one.shape);
+  }
+}
+
 TEST_F(AnnotationParts, EditsAndDeletionsBetweenTwoPartsArriveToo) {
   for (int i = 0; i < 40; ++i) list_.push_back(MakeStroke(i, 2000));
   AnnotationReader reader;

@@ -48,6 +48,14 @@ class ListBackend final : public Backend {
   void GetStill(std::optional<FrameId>, VideoView, Done<Still> done) override {
     done(absl::NotFoundError("none"));
   }
+  absl::StatusOr<std::vector<Eigen::Vector3d>> LocatePointer(
+      absl::Span<const AnnotationTarget> points, std::optional<StrokeSurface>*) override {
+    return std::vector<Eigen::Vector3d>(points.size(), Eigen::Vector3d::UnitZ());
+  }
+  void SetPointers(std::shared_ptr<const PointerList>) override {}
+  void ReadPicture(std::string, Done<PicturePtr> done) override {
+    done(absl::UnimplementedError("not here"));
+  }
   void SetPresence(std::shared_ptr<const ParticipantSet>) override {}
   void SetVideoDemand(VideoView, bool) override {}
   void RequestKeyFrame(VideoView) override {}

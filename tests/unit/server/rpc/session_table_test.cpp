@@ -116,8 +116,8 @@ TEST(SessionTable, TellsWhoIsGoneAndTellsItAgainUntilItIsTaken) {
   std::vector<std::string> told;
   bool takes = false;
   SessionTable sessions({.max_sessions = 2, .unused_ns = 0, .idle_ns = 0},
-                        [&](const std::string& id) {
-                          told.push_back(id);
+                        [&](const Session& gone) {
+                          told.push_back(gone.participant_id);
                           return takes;
                         });
   const auto join_and_use = [&] {

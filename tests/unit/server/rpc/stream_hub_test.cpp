@@ -30,6 +30,14 @@ class Rest : public Backend {
   }
   absl::Status SubmitGaze(GazeCommand) override { return absl::OkStatus(); }
   void GetStill(std::optional<FrameId>, VideoView, Done<Still>) override {}
+  absl::StatusOr<std::vector<Eigen::Vector3d>> LocatePointer(
+      absl::Span<const AnnotationTarget> points, std::optional<StrokeSurface>*) override {
+    return std::vector<Eigen::Vector3d>(points.size(), Eigen::Vector3d::UnitZ());
+  }
+  void SetPointers(std::shared_ptr<const PointerList>) override {}
+  void ReadPicture(std::string, Done<PicturePtr> done) override {
+    done(absl::UnimplementedError("not here"));
+  }
   void SetVideoDemand(VideoView, bool) override {}
   void SetPresence(std::shared_ptr<const ParticipantSet>) override {}
   void RequestKeyFrame(VideoView) override { ++key_frames_asked; }

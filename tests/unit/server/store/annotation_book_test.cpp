@@ -138,10 +138,10 @@ TEST_F(BookTest, UndoIsDurable) {
   EXPECT_THAT(*book_->Latest(), IsEmpty());
 }
 
-TEST_F(BookTest, AForgottenSessionsChangesStayAndCannotBeUndone) {
+TEST_F(BookTest, AForgottenPersonsChangesStayAndCannotBeUndone) {
   Start();
   ASSERT_TRUE(Create("r1").ok());
-  book_->ForgetSession("s");
+  book_->ForgetPerson("s");
   Answer<std::string> answer;
   book_->Undo("s", answer.Take());
   EXPECT_EQ(answer.Get().status().code(), absl::StatusCode::kFailedPrecondition);

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 
 namespace saccade {
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <utility>
 
-#include "server/overlay/strokes.hpp"
+#include "shared/marks/strokes.hpp"
 
 namespace saccade {
 namespace {

@@ -9,12 +9,12 @@
 
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
+#include "shared/marks/shape_lines.hpp"
 #include "shared/scene/annotation.hpp"
 
 namespace saccade {
 
 using Polyline2 = std::vector<Eigen::Vector2d>;  // [px, distorted]
-using Polyline3 = std::vector<Eigen::Vector3d>;  // in world [m]
 
 /// A polyline of one annotation as it appears through the lens.
 struct Stroke {
@@ -56,17 +56,15 @@ struct AxisStroke {
   std::optional<Eigen::Vector2d> end_px;
 };
 
-/// Marks of the annotations in a view: exact definitions in docs/design/overlay.md, which the
-/// page follows too. Stopped annotations and those whose place is not known have none. Points
-/// behind the camera, not finite or beyond the lens leave gaps, never NaN.
+/// Marks of the annotations in a view: exact definitions in docs/design/overlay.md and
+/// marks.md, which the page follows too. `metric`: the map has metres, which lengths are told in.
+/// Stopped annotations and those whose place is not known have none. Points behind the camera, not
+/// finite or beyond the lens leave gaps, never NaN.
 Marks AnnotationMarks(const CameraModel& camera, const Rigid3& world_from_camera,
-                      const std::vector<Annotation>& annotations);
+                      const std::vector<Annotation>& annotations, bool metric = true);
 
 /// The world's axes at its origin.
 std::array<AxisStroke, 3> WorldAxes(const CameraModel& camera, const Rigid3& world_from_camera);
-
-/// The lines of one annotation's shape in world.
-std::vector<Polyline3> ShapeLines(const Annotation& annotation);
 
 /// A polyline in world as it appears through the lens: cut at the near plane (2 cm), divided until
 /// no piece bends by more than 0.25 px (at most 256 pieces), cut where it is more than 32 px
