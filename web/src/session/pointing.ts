@@ -52,7 +52,8 @@ export class Pointing {
 
   private stayAwake(): void {
     if (performance.now() - this.sentMs < AWAKE_MS || this.inFlight > 0) return;
-    if (this.kind === 'laser' && this.last) this.waiting = [this.last];
+    if (!this.last) return;
+    this.waiting = [this.last];
     void this.send();
   }
 

@@ -201,7 +201,13 @@ export const HEAD_COMMANDS: readonly Control<HeadCommandName>[] = [
 /** Above the list of marks. */
 export const MARK_COMMANDS: readonly Control<MarkCommandName>[] = [
   { name: 'mine', label: 'Only mine', key: 'o', shown: 'O', hint: 'list and draw only your marks' },
-  { name: 'hide', label: 'Hide marks', key: 'm', shown: 'M', hint: 'draw no marks; again: all' },
+  {
+    name: 'hide',
+    label: 'Hide marks',
+    key: 'm',
+    shown: 'M',
+    hint: 'do not draw the selected marks, or any; again: all',
+  },
   {
     name: 'snapshot',
     label: 'Snapshot',

@@ -87,10 +87,11 @@ export class AnnotationsPanel {
     const { scale, ageMs } = this.session;
     const words = anchorWords(annotation, scale);
     const refusal = this.state.refusal(`annotation ${annotation.id}`);
+    const hidden = this.state.hidden.has(annotation.id) ? 'hidden · ' : '';
     const provisional = annotation.anchor.state === 'provisional' ? 'provisional · ' : '';
     row.update(annotation, {
       selected: this.state.selection.has(annotation.id),
-      state: refusal ?? `${provisional}${dated(words.text, ageMs)}`,
+      state: refusal ?? `${hidden}${provisional}${dated(words.text, ageMs)}`,
       warn: words.warn || refusal !== undefined,
       metric: scale.metric,
       authorColour: this.colours.get(annotation.authorPersonId),

@@ -51,6 +51,9 @@ export class AppState {
   area: { readonly pane: PaneName; readonly from: Pixel; readonly to: Pixel } | undefined;
   /** Where the keyboard clicks in the video, as shares of the pane; undefined: not used yet. */
   cursor: { readonly x: number; readonly y: number } | undefined;
+  byKeys = false; // it, and not the mouse, was moved last
+  /** Marks that this person does not want to see drawn. */
+  readonly hidden = new Set<string>();
   /** The head turns as fast as it can. */
   fast = false;
   /** What the camera was asked to look at, until the server says that it does. */
@@ -95,7 +98,16 @@ export class AppState {
   /** True if it is drawn: a selected one always is. */
   draws(annotation: Annotation): boolean {
     if (this.selected.has(annotation.id)) return true;
-    return !this.hideMarks && this.lists(annotation);
+    return !this.hideMarks && !this.hidden.has(annotation.id) && this.lists(annotation);
+  }
+
+  /** The selected ones are not drawn any more; with none selected all are again, or none is. */
+  hide(): void {
+    for (const id of this.selected) this.hidden.add(id);
+    if (this.selected.size > 0) this.select([]);
+    else if (this.hidden.size > 0) this.hidden.clear();
+    else this.hideMarks = !this.hideMarks;
+    this.changed();
   }
 
   changed(): void {

@@ -89,7 +89,7 @@ export class Controller implements ToolActions, AnnotationActions {
   runMarks(command: MarkCommandName): void {
     const { state } = this;
     if (command === 'mine') state.filter = { ...state.filter, mine: !state.filter.mine };
-    else if (command === 'hide') state.hideMarks = !state.hideMarks;
+    else if (command === 'hide') state.hide();
     else {
       this.with_.aim.video
         .snapshot(state.me.name)
@@ -119,7 +119,7 @@ export class Controller implements ToolActions, AnnotationActions {
   /** `adds`: to those selected, or from them. */
   select(id: string, adds = false): void {
     const { state } = this;
-    if (adds) return state.toggle(id);
+    if (adds || state.tool === 'area') return state.toggle(id);
     const alone = state.selection.size === 1 && state.selection.has(id);
     state.select(alone ? [] : [id]);
     if (!alone) this.with_.aim.map.map?.reveal(this.session.annotations.get(id));
@@ -140,6 +140,12 @@ export class Controller implements ToolActions, AnnotationActions {
     if (why) return this.state.refuse(`annotation ${id}`, why);
     this.state.select([...this.state.selection].filter((each) => each !== id));
     void attempt(this.state, `annotation ${id}`, () => this.edits.remove(id));
+  }
+
+  /** The words of the selected mark. */
+  editSelected(): void {
+    const { selectedId } = this.state;
+    if (selectedId) this.startEditing(selectedId);
   }
 
   startEditing(id: string): void {

@@ -56,14 +56,21 @@ export class Hand {
 
   gestures(pane: PaneName): PaneGestures {
     return {
-      hover: (x, y) => this.hover(pane, x, y),
+      hover: (x, y) => {
+        this.state.byKeys = false;
+        this.hover(pane, x, y);
+      },
       leave: () => this.leave(pane),
       moved: () => {
         this.state.hover = undefined;
         this.with_.aim.map.map?.hold();
       },
-      grab: (press) => (this.drag = this.with_.grips.grab(pane, press)),
+      grab: (press) => {
+        this.state.hover = undefined;
+        return (this.drag = this.with_.grips.grab(pane, press));
+      },
       let: () => (this.drag = undefined),
+      holding: () => this.drag !== undefined,
       press: (x, y) => this.press(pane, x, y),
       click: (x, y, adds) => this.click(pane, x, y, adds),
     };
@@ -130,6 +137,7 @@ export class Hand {
     const { x, y } = this.state.cursor ?? { x: 0.5, y: 0.5 };
     const within = (value: number): number => Math.min(Math.max(value, 0.01), 0.99);
     this.state.cursor = { x: within(x + dx), y: within(y + dy) };
+    this.state.byKeys = true;
     this.keyMoved('video');
   }
 
@@ -146,7 +154,7 @@ export class Hand {
     state.pointer = { pane, x, y };
     const pixel = aim.pixelAt(pane, x, y);
     if (state.tool === 'select' || state.tool === 'area') {
-      const byKey = pixel && state.cursor && pane === 'video';
+      const byKey = pixel && state.byKeys && pane === 'video';
       state.hover = byKey ? { pane, pixel, landing: aim.landing(pane, pixel) } : undefined;
       state.moved();
       return this.pointAt(pixel && aim.pick(pane, pixel)?.id);

@@ -34,6 +34,8 @@ export class Help {
       h('dd', {}, 'find marks by text, shape, author'),
       h('dt', {}, h('kbd', {}, '^A'), 'All'),
       h('dd', {}, 'select all marks that are drawn'),
+      h('dt', {}, h('kbd', {}, 'F2'), 'Words'),
+      h('dd', {}, 'change the words of the selected mark; or double-click its row'),
       h('dt', {}, h('kbd', {}, 'Esc'), 'Give up'),
       h('dd', {}, 'what is under way, then the tool, then the selection'),
     );

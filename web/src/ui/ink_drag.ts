@@ -62,7 +62,10 @@ export class InkDrag implements Drag {
     if (!point) return;
     this.last = at;
     this.inWorld.push(point);
-    this.pointing.add({ kind: 'point', pointInWorld: point });
+    // A picture's pixels lie on what the server knows to be there, as those of the mark will.
+    const { target } = this.begun.landing;
+    if (target.kind === 'pixel') this.pointing.add({ ...target, pixel });
+    else this.pointing.add({ kind: 'point', pointInWorld: point });
     this.show();
   }
 

@@ -47,6 +47,7 @@ export function handleKeys(
     if (name === 'copy' && !getSelection()?.isCollapsed) return;
     if (event.key === '?') help.toggle();
     if (event.key === 'Escape') controller.escape();
+    if (event.key === 'F2') controller.editSelected();
     if (event.key === '/' && !event.ctrlKey && !event.metaKey && !event.altKey) {
       event.preventDefault();
       find();

@@ -12,7 +12,7 @@ export class PictureCache {
 
   /** Undefined until its bytes are here; then they are asked for. */
   get({ id, picture }: Annotation): ImageBitmap | undefined {
-    if (!picture) return undefined;
+    if (!picture?.sha256) return undefined;
     const { sha256 } = picture;
     if (!this.kept.has(sha256)) void this.load(id, sha256);
     return this.kept.get(sha256);

@@ -12,6 +12,8 @@ export interface PaneGestures {
   grab(press: Press): Drag | undefined;
   /** What was grabbed is no longer held. */
   let(): void;
+  /** False once it was given up, by a key. */
+  holding(): boolean;
   press(clientX: number, clientY: number): void;
   /** `adds`: with Shift. */
   click(clientX: number, clientY: number, adds: boolean): void;
@@ -69,7 +71,7 @@ function handleDrags(
   };
   const release = (event: PointerEvent): void => {
     if (!held || !mine(event)) return;
-    const click = held.release(event);
+    const click = gestures.holding() && held.release(event);
     held = undefined;
     gestures.let();
     if (click) gestures.click(event.clientX, event.clientY, event.shiftKey);
@@ -92,7 +94,7 @@ function handleDrags(
     mine(event);
   });
   element.addEventListener('pointermove', (event) => {
-    if (held && mine(event)) held.move(event);
+    if (held && mine(event) && gestures.holding()) held.move(event);
   });
   element.addEventListener('pointerup', release);
   element.addEventListener('pointercancel', release);
