@@ -12,6 +12,7 @@ import {
   selectRow,
   shot,
   sleep,
+  tracked,
 } from './tools.mjs';
 import { pointersOn } from './tools_keys.mjs';
 
@@ -226,7 +227,7 @@ async function undoIsThePersons(context) {
   await page.goto('about:blank');
   await sleep(500);
   await page.goto(`${context.url}/?name=Annette`);
-  await ann.waitForStatus(/^tracking/, 60_000);
+  await tracked(context);
   await page.locator(`aside li[data-id="${cube?.id}"]`).waitFor({ timeout: 15_000 });
   await ann.press('o');
   await sleep(600);
@@ -242,7 +243,7 @@ async function undoIsThePersons(context) {
     `${gone ? 'undone' : 'not undone'}, the other's ${left ? 'stays' : 'gone'}; only mine lists ${mine} and ${theirs}`,
   );
   await page.goto(`${context.url}/?name=Ann`);
-  await ann.waitForStatus(/^tracking/, 60_000);
+  await tracked(context);
   await page.locator('canvas.map[data-eye]').waitFor();
   await ann.enlarge('video');
 }
@@ -478,7 +479,7 @@ async function viewer(context) {
   });
   await page.evaluate(() => sessionStorage.clear());
   await page.reload();
-  await ann.waitForStatus(/^tracking/, 60_000);
+  await tracked(context);
   await page.locator('nav button[data-control="cube"][aria-disabled="true"]').waitFor();
   await ann.press('c');
   await sleep(400);
@@ -493,7 +494,7 @@ async function viewer(context) {
   await page.unroute('**/saccade.v1.SessionService/Join');
   await page.evaluate(() => sessionStorage.clear());
   await page.reload();
-  await ann.waitForStatus(/^tracking/, 60_000);
+  await tracked(context);
   await page.locator('canvas.map[data-eye]').waitFor();
   await ann.enlarge('video');
 }

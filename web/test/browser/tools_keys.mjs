@@ -2,7 +2,7 @@
 import { AnnotationShape } from '../../src/gen/saccade/v1/annotation_pb.js';
 import { barriers } from './axe.mjs';
 import { samplePng } from './files.mjs';
-import { listOf, listWhen, made, noteOf, shot, sleep } from './tools.mjs';
+import { listOf, listWhen, made, noteOf, opened, shot, sleep } from './tools.mjs';
 
 export async function byKeyboard(context) {
   const { ann, check } = context;
@@ -50,6 +50,7 @@ export async function byKeyboard(context) {
   note(
     'ink',
     await made(context, AnnotationShape.INK, async () => {
+      await page.locator('.video').focus();
       await ann.press('Enter');
       await arrows('ArrowUp', 6);
       await arrows('ArrowRight', 6);
@@ -60,8 +61,7 @@ export async function byKeyboard(context) {
   note(
     'check list',
     await made(context, AnnotationShape.CHECK_LIST, async () => {
-      await ann.press('Enter');
-      await page.locator('dialog[open] #list-title').waitFor();
+      await opened(context, '#list-title', () => ann.press('Enter'));
       await page.keyboard.type('Keys');
       await ann.press('Tab');
       await page.keyboard.type('one');
@@ -75,8 +75,7 @@ export async function byKeyboard(context) {
   note(
     'picture',
     await made(context, AnnotationShape.PICTURE, async () => {
-      await ann.press('Enter');
-      await page.locator('dialog[open] #picture-file').waitFor();
+      await opened(context, '#picture-file', () => ann.press('Enter'));
       const chooser = page.waitForEvent('filechooser');
       await ann.press('Enter');
       await (await chooser).setFiles(samplePng(context.folder));
