@@ -70,7 +70,7 @@ export function letGoOfButtons(): void {
 
 /** True while keys are text. */
 export const isTextField = (target: EventTarget | null): boolean =>
-  target instanceof HTMLInputElement ||
+  (target instanceof HTMLInputElement && target.type !== 'checkbox') ||
   target instanceof HTMLTextAreaElement ||
   target instanceof HTMLSelectElement;
 

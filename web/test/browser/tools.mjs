@@ -166,7 +166,7 @@ async function nameIsAskedOnce(context) {
 }
 
 /** Every tool once by the mouse. */
-async function byMouse(context) {
+export async function byMouse(context) {
   const { ann, check } = context;
   const { page } = ann;
   const click = async (key, x, y) => {
