@@ -55,6 +55,11 @@ export class Camera {
     return { x: ray.x / length, y: ray.y / length, z: ray.z / length };
   }
 
+  /** True where straight lines appear straight. */
+  get straight(): boolean {
+    return this.intrinsics.model === 'pinhole';
+  }
+
   inImage(pixel: Pixel, border = 0): boolean {
     const { width, height } = this.intrinsics;
     return (

@@ -5,6 +5,7 @@ import { mix, type Pixel, type Vec3 } from './vec3';
 const NEAR_M = 0.02;
 const MAX_BEND_PX = 0.25;
 const BORDER_PX = 32;
+const SHORT_PX = 6;
 const MAX_DEPTH = 8;
 
 /**
@@ -80,6 +81,8 @@ function needsDivision(
   if (!start || !end) return start !== end; // one end only: find where it is lost
   const inside = camera.inImage(start, -BORDER_PX);
   if (inside !== camera.inImage(end, -BORDER_PX)) return true;
+  // Nothing to look for: straight lines stay straight, and a short one has no room to bend.
+  if (inside && (camera.straight || isShort(start, end))) return false;
   // Quarters as well: a bend with its turning point in the middle would hide there. Perspective
   // moves points along the line, so what counts is their distance from it.
   for (const t of [0.25, 0.5, 0.75]) {
@@ -89,6 +92,9 @@ function needsDivision(
   }
   return false;
 }
+
+const isShort = (a: Pixel, b: Pixel): boolean =>
+  Math.abs(a.u - b.u) + Math.abs(a.v - b.v) < SHORT_PX;
 
 function distanceFromLine(p: Pixel, a: Pixel, b: Pixel): number {
   const du = b.u - a.u;

@@ -3,8 +3,9 @@ import { threeFromWorld, threeOrientation } from '../geometry/axes';
 import { Camera } from '../geometry/camera';
 import type { Rigid3 } from '../geometry/rigid3';
 import { distance, type Vec3 } from '../geometry/vec3';
-import { makeView, type View } from '../geometry/view';
+import { makeView, projectPoint, type View } from '../geometry/view';
 import type { Session } from '../session/session';
+import type { Annotation } from '../session/types';
 import { FeatureCloud } from './feature_cloud';
 import { Frustum } from './frustum';
 import { groundGrid } from './ground_grid';
@@ -13,6 +14,8 @@ import { PathLine } from './path_line';
 
 const FIELD_OF_VIEW_DEG = 45;
 const FRUSTUM_SHARE = 0.14; // of the distance looked from: the live picture keeps its size
+
+const REVEAL_PX = 40; // nearer to the edge than that is not in view
 
 /** True without a graphics card, where smooth edges would cost more than the rest together. */
 function drawsInSoftware(): boolean {
@@ -85,6 +88,18 @@ export class MapView {
     const bounds = this.bounds();
     if (bounds) this.orbit.lookAt(bounds.centre, bounds.radius);
     this.dirty = true;
+  }
+
+  /** Turns to a mark that is not in view, as far off as the eye is now. */
+  reveal(mark: Pick<Annotation, 'anchor'> | undefined): void {
+    const point = mark?.anchor.pointInWorld;
+    if (!point) return;
+    const view = this.view();
+    const at = projectPoint(view, point);
+    if (at && view.camera.inImage(at, REVEAL_PX)) return;
+    this.held = true;
+    this.following = false;
+    this.orbit.follow(point);
   }
 
   /** The eye, in CSS pixels of this view. */

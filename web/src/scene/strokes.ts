@@ -1,8 +1,11 @@
 import { projectPolyline } from '../geometry/polyline';
-import { add, type Pixel, type Vec3 } from '../geometry/vec3';
+import { type Rigid3, transform } from '../geometry/rigid3';
+import { type Pixel, type Vec3 } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
-import { type Annotation, doNotTrust, type Scale, type Shape } from '../session/types';
+import { type Annotation, doNotTrust, type MarkForm, type Scale } from '../session/types';
 import { charactersOf } from './characters';
+import { markWords } from './label_words';
+import { labelPoint, linesOf, pictureOutline, reachOf } from './shapes';
 
 /** A polyline in pixels of a view, through its lens. */
 export interface Stroke {
@@ -29,15 +32,16 @@ export interface Marks {
 }
 
 /** A mark to draw, answered by the server or not yet. */
-export interface Mark {
+export interface Mark extends Omit<MarkForm, 'colorRgba' | 'picture'> {
   readonly id: string;
-  readonly shape: Shape;
-  readonly text: string;
-  readonly sizeM: number;
+  readonly author: string;
   readonly pointInWorld: Vec3;
-  readonly inkOffsetsM: readonly Vec3[];
   readonly colour: string;
   readonly hollow: boolean;
+  /** What its label says, without "do not trust". */
+  readonly words: string;
+  /** PICTURE: height over width. */
+  readonly aspect: number;
 }
 
 /** Its own colour as CSS; opaque, so that it can be seen, whatever the last byte is. */
@@ -46,92 +50,102 @@ export const colourOf = ({ colorRgba }: Pick<Annotation, 'colorRgba'>): string =
 
 /** Undefined where the annotation has no place in this map. */
 export function markOf(annotation: Annotation, scale: Scale): Mark | undefined {
-  const { anchor, id, shape, text, sizeM, inkOffsetsM } = annotation;
+  const { anchor, id, author } = annotation;
   if (!anchor.pointInWorld || anchor.state === 'stopped') return undefined;
-  const colour = colourOf(annotation);
   const hollow = doNotTrust(anchor, scale);
-  return { id, shape, text, sizeM, inkOffsetsM, colour, hollow, pointInWorld: anchor.pointInWorld };
+  return makeMark(annotation, { id, author, pointInWorld: anchor.pointInWorld, hollow }, scale);
+}
+
+export function makeMark(
+  form: MarkForm,
+  where: Pick<Mark, 'id' | 'author' | 'pointInWorld' | 'hollow'>,
+  { metric }: Scale,
+): Mark {
+  const { shape, text, sizeM, inkOffsetsM, worldFromMark, extentM } = form;
+  const { number, lengthM, lengthSigmaM, checkItems, picture } = form;
+  return {
+    ...where,
+    ...{ shape, text, sizeM, inkOffsetsM, worldFromMark, extentM },
+    ...{ number, lengthM, lengthSigmaM, checkItems },
+    colour: colourOf(form),
+    words: markWords(form, metric),
+    aspect: picture && picture.width > 0 ? picture.height / picture.width : 1,
+  };
 }
 
 const AXIS_M = 0.1;
 
-/** Wire frame of a cube, axes parallel to world, its centre at the anchor: 12 edges. */
-export function cubeEdges(centre: Vec3, sizeM: number): [Vec3, Vec3][] {
-  const h = sizeM / 2;
-  const corner = (i: number): Vec3 =>
-    add(centre, { x: i & 1 ? h : -h, y: i & 2 ? h : -h, z: i & 4 ? h : -h });
-  const edges: [Vec3, Vec3][] = [];
-  for (let i = 0; i < 8; ++i) {
-    for (const bit of [1, 2, 4]) {
-      if (!(i & bit)) edges.push([corner(i), corner(i | bit)]);
-    }
-  }
-  return edges;
-}
+/** True where nothing of it can be in front of the eye. */
+const isBehind = (mark: Mark, cameraFromWorld: Rigid3): boolean =>
+  transform(cameraFromWorld, mark.pointInWorld).z < -reachOf(mark);
 
-/** An arrow in world whose tip is the anchor, pointing along +y (down where gravity is known). */
-function arrowLines(tip: Vec3, sizeM: number): Vec3[][] {
-  const up = (dx: number, dy: number, dz: number): Vec3 => add(tip, { x: dx, y: -dy, z: dz });
-  const head = sizeM * 0.4;
-  const half = head * 0.5;
-  return [
-    [up(0, 2 * sizeM, 0), tip],
-    [up(-half, head, 0), tip, up(half, head, 0)],
-    [up(0, head, -half), tip, up(0, head, half)],
-  ];
-}
-
-function linesOf(mark: Mark): Vec3[][] {
-  switch (mark.shape) {
-    case 'cube':
-      return cubeEdges(mark.pointInWorld, mark.sizeM);
-    case 'note':
-      return [[mark.pointInWorld, noteTop(mark)]];
-    case 'arrow':
-      return arrowLines(mark.pointInWorld, mark.sizeM);
-    case 'ink':
-      return [mark.inkOffsetsM.map((offset) => add(mark.pointInWorld, offset))];
-  }
-}
-
-/** A note stands on a pin, one size above its anchor. */
-const noteTop = (mark: Mark): Vec3 => add(mark.pointInWorld, { x: 0, y: -mark.sizeM, z: 0 });
-
-/** All marks as they appear in a view. What cannot be projected leaves a gap. */
-export function strokesOf(view: View, marks: readonly Mark[]): Marks {
+/**
+ * All marks as they appear in a view. What cannot be projected leaves a gap. `named`: those whose label
+ * says who made them, even where they say nothing else.
+ */
+export function strokesOf(
+  view: View,
+  marks: readonly Mark[],
+  named: readonly (string | undefined)[] = [],
+): Marks {
   const strokes: Stroke[] = [];
   const labels: Label[] = [];
   for (const mark of marks) {
-    for (const line of linesOf(mark)) {
+    if (isBehind(mark, view.cameraFromWorld)) continue;
+    const { id: annotationId, colour, hollow } = mark;
+    for (const line of linesOf(mark, view)) {
       for (const points of projectPolyline(view.camera, view.cameraFromWorld, line)) {
-        strokes.push({ annotationId: mark.id, points, colour: mark.colour, hollow: mark.hollow });
+        strokes.push({ annotationId, points, colour, hollow });
       }
     }
-    const at = projectPoint(view, mark.shape === 'note' ? noteTop(mark) : mark.pointInWorld);
+    const by = named.includes(annotationId) ? mark.author : '';
+    if (!by && !mark.words && !hollow) continue;
+    const at = projectPoint(view, labelPoint(mark));
     if (!at || !view.camera.inImage(at, -32)) continue;
-    const text = labelOf(mark, shorten);
-    if (!text) continue;
-    const { id: annotationId, colour, hollow } = mark;
-    labels.push({ annotationId, text, whole: labelOf(mark, oneLine), at, colour, hollow });
+    const text = labelOf(mark, shorten(mark.words));
+    const whole = [labelOf(mark, plainLines(mark.words)), by].filter(Boolean).join(' · ');
+    if (text || whole)
+      labels.push({ annotationId, text: text || whole, whole, at, colour, hollow });
   }
   return { strokes, labels };
 }
 
-function labelOf(mark: Mark, cut: (text: string) => string): string {
-  const words = mark.shape === 'note' || mark.text ? cut(mark.text || 'note') : '';
+function labelOf(mark: Mark, words: string): string {
   if (!mark.hollow) return words;
   return mark.id === '' ? words : [words, 'do not trust'].filter(Boolean).join(': ');
 }
 
-const oneLine = (text: string): string => text.replace(/[\n\r\t]/g, ' ');
+const plainLines = (text: string): string => text.replace(/[\r\t]/g, ' ');
 
 const MAX_LABEL = 40; // characters
+const shortened = new Map<string, string>();
 
-/** Between characters as people count them: never within an emoji or an accented letter. */
+/** The first line, cut between characters as people count them: never within an emoji or an accented letter. */
 function shorten(text: string): string {
-  const characters = charactersOf(oneLine(text));
-  if (characters.length <= MAX_LABEL) return characters.join('');
-  return `${characters.slice(0, MAX_LABEL - 1).join('')}…`;
+  if (text.length <= MAX_LABEL && !/[\n\r\t]/.test(text)) return text;
+  let short = shortened.get(text);
+  if (short === undefined) {
+    if (shortened.size > 500) shortened.clear();
+    const [first = '', ...rest] = text.split('\n');
+    const characters = charactersOf(plainLines(first));
+    const cut = characters.length > MAX_LABEL || rest.length > 0;
+    short = `${characters.slice(0, MAX_LABEL - 1).join('')}${cut ? '…' : ''}`;
+    shortened.set(text, short);
+  }
+  return short;
+}
+
+/** A picture as it appears: rows of its grid from the top left, each point undefined where the lens ends. */
+export function pictureGrid(view: View, mark: Mark, steps: number): (Pixel | undefined)[][] {
+  const [lowerLeft, lowerRight, , upperLeft] = pictureOutline(mark, view);
+  if (!lowerLeft || !lowerRight || !upperLeft) return [];
+  const at = (across: number, down: number): Vec3 => ({
+    x: upperLeft.x + (lowerRight.x - lowerLeft.x) * across,
+    y: upperLeft.y + (lowerLeft.y - upperLeft.y) * down,
+    z: upperLeft.z + (lowerRight.z - lowerLeft.z) * across,
+  });
+  const shares = Array.from({ length: steps + 1 }, (_, i) => i / steps);
+  return shares.map((down) => shares.map((across) => projectPoint(view, at(across, down))));
 }
 
 export interface AxisStroke {

@@ -1,10 +1,4 @@
 import {
-  AnchorState as PbAnchorState,
-  AnnotationShape,
-  type Anchor as PbAnchor,
-  type Annotation as PbAnnotation,
-} from '../gen/saccade/v1/annotation_pb';
-import {
   CameraIntrinsics_Model as Model,
   type CameraIntrinsics,
   type Rigid3 as PbRigid3,
@@ -31,9 +25,6 @@ import { covariance3 } from '../geometry/covariance';
 import { IDENTITY, type Rigid3 } from '../geometry/rigid3';
 import { type Vec3, ZERO } from '../geometry/vec3';
 import type {
-  Anchor,
-  AnchorState,
-  Annotation,
   Feature,
   FeatureState,
   FrameFeatures,
@@ -42,7 +33,6 @@ import type {
   Quality,
   Role,
   SeenFeature,
-  Shape,
   Stages,
   Statistics,
   TrackingStatus,
@@ -71,29 +61,6 @@ const featureStates: Record<PbFeatureState, FeatureState> = {
   [PbFeatureState.FAILED]: 'failed',
 };
 
-const anchorStates: Record<PbAnchorState, AnchorState> = {
-  [PbAnchorState.UNSPECIFIED]: 'provisional',
-  [PbAnchorState.PROVISIONAL]: 'provisional',
-  [PbAnchorState.TRACKING]: 'tracking',
-  [PbAnchorState.PAUSED]: 'paused',
-  [PbAnchorState.STOPPED]: 'stopped',
-};
-
-const shapes: Record<AnnotationShape, Shape> = {
-  [AnnotationShape.UNSPECIFIED]: 'cube',
-  [AnnotationShape.CUBE]: 'cube',
-  [AnnotationShape.NOTE]: 'note',
-  [AnnotationShape.ARROW]: 'arrow',
-  [AnnotationShape.INK]: 'ink',
-};
-
-export const pbShapes: Record<Shape, AnnotationShape> = {
-  cube: AnnotationShape.CUBE,
-  note: AnnotationShape.NOTE,
-  arrow: AnnotationShape.ARROW,
-  ink: AnnotationShape.INK,
-};
-
 const roles: Record<PbRole, Role> = {
   [PbRole.UNSPECIFIED]: 'viewer',
   [PbRole.EXPERT]: 'expert',
@@ -116,7 +83,7 @@ const models: Record<Model, LensModel> = {
   [Model.FOV]: 'fov',
 };
 
-const toVec3 = (v: Vector3 | undefined): Vec3 => (v ? { x: v.x, y: v.y, z: v.z } : ZERO);
+export const toVec3 = (v: Vector3 | undefined): Vec3 => (v ? { x: v.x, y: v.y, z: v.z } : ZERO);
 
 function toRigid3(pb: PbRigid3 | undefined): Rigid3 {
   if (!pb?.rotation) return IDENTITY;
@@ -189,33 +156,12 @@ export function toFrameFeatures(pb: PbFrameFeatures): FrameFeatures {
   return seen;
 }
 
-export const toAnchor = (pb: PbAnchor | undefined): Anchor => ({
-  state: anchorStates[pb?.state ?? PbAnchorState.UNSPECIFIED],
-  pointInWorld: pb?.pointInWorldM && toVec3(pb.pointInWorldM),
-  covariance: covariance3(pb?.covarianceInWorldM2?.upper ?? []),
-  errorMm: pb?.errorMm ?? 0,
-  errorPx: pb?.errorPx,
-  reason: pb?.reason ?? '',
-});
-
-export function toAnnotation(pb: PbAnnotation): Annotation {
-  return {
-    id: pb.id,
-    shape: shapes[pb.shape],
-    text: pb.text,
-    author: pb.author,
-    sizeM: pb.sizeM > 0 ? pb.sizeM : 0.05,
-    colorRgba: pb.colorRgba || 0xffffffff,
-    createdMs: Number(pb.createdUnixNs) / 1e6,
-    inkOffsetsM: pb.inkOffsetM.map(toVec3),
-    anchor: toAnchor(pb.anchor),
-  };
-}
-
 export const toParticipant = (pb: PbParticipant): Participant => ({
   participantId: pb.participantId,
   name: pb.displayName,
   role: roles[pb.role],
+  personId: pb.personId,
+  colorRgba: pb.colorRgba,
 });
 
 export const toStatistics = (pb: StatisticsEvent): Statistics => ({

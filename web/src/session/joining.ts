@@ -14,6 +14,7 @@ export class Joining {
   private readonly role: Role;
   private readonly kept: KeptSession | undefined;
   private readonly tabs: Tabs | undefined;
+  private readonly personKey: string;
 
   constructor(
     private readonly session: Clients['session'],
@@ -22,9 +23,11 @@ export class Joining {
       readonly name: string;
       readonly kept?: KeptSession;
       readonly tabs?: Tabs;
+      readonly personKey?: string;
     },
   ) {
     ({ name: this.name, role: this.role, kept: this.kept, tabs: this.tabs } = options);
+    this.personKey = options.personKey ?? '';
     this.resumes = this.kept?.recall(this.name) ?? '';
     this.maybeShared = this.resumes !== '' && this.kept?.maybeShared === true;
   }
@@ -58,7 +61,8 @@ export class Joining {
   }
 
   private async ask(resumeSessionId: string, signal: AbortSignal): Promise<JoinResponse> {
-    const request = { displayName: this.name, role: pbRoles[this.role] };
+    const { name: displayName, personKey } = this;
+    const request = { displayName, personKey, role: pbRoles[this.role] };
     const options = { signal, timeoutMs: 5000 };
     try {
       return await this.session.join({ ...request, resumeSessionId }, options);

@@ -23,3 +23,8 @@ export function recallName(search: string, storage: Pick<Storage, 'getItem'>): s
 
 export const keepName = (name: string, storage: Pick<Storage, 'setItem'>): void =>
   storage.setItem(KEY, name);
+
+/** True where nobody has said yet what this person is called. */
+export const isNameless = (search: string, storage: Pick<Storage, 'getItem'>): boolean =>
+  cleanName(new URLSearchParams(search).get('name') ?? '') === '' &&
+  cleanName(storage.getItem(KEY) ?? '') === '';

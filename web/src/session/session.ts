@@ -4,7 +4,8 @@ import type { Event, JoinResponse, Topic } from '../gen/saccade/v1/session_pb';
 import type { Clients } from '../transport/clients';
 import { Backoff } from '../transport/backoff';
 import { isRefusal, isReplaced, streamEndWords } from '../transport/errors';
-import { Acknowledger } from './acknowledger';
+import { acknowledge } from './acknowledge';
+import type { Acknowledger } from './acknowledger';
 import { AnnotationBook } from './annotation_book';
 import { ClockOffset, pageNowMs, ping } from './clock';
 import { toParticipant, toPose, toStatistics } from './convert';
@@ -14,21 +15,14 @@ import { toGaze } from './gaze_convert';
 import { Joining } from './joining';
 import type { KeptSession } from './kept_session';
 import { MapState } from './map_state';
+import { follow } from './path';
+import type { PictureSink } from './picture_sink';
+import { PointerBook } from './pointers';
 import { FrameRing } from './ring';
 import { silenceWords } from './silence';
 import { sleep } from './sleep';
 import type { Tabs } from './tabs';
-import { isPlaced } from './types';
 import type { FrameFacts, Link, Participant, Pose, Role, Scale, Statistics, View } from './types';
-
-/** Where coded pictures go. */
-export interface PictureSink {
-  decode(facts: FrameFacts, unit: AccessUnit): void;
-  /** A new subscription begins: the next unit is a key frame. */
-  reset(): void;
-  /** True while so much waits to be decoded that no more should come. */
-  readonly behind: boolean;
-}
 
 export interface SessionOptions {
   readonly role: Role;
@@ -37,6 +31,8 @@ export interface SessionOptions {
   readonly topics?: Topic[]; // absent: all
   /** Where the session is kept for a reload; without it, only while the page lives. */
   readonly kept?: KeptSession;
+  /** The secret of whoever sits here; absent: a person of this session alone. */
+  readonly personKey?: string;
   /** The other tabs of this browser, where they can be asked. */
   readonly tabs?: Tabs;
   /** Before joining: redeems an invite, and waits to be let in. Rejects if nobody lets one in. */
@@ -62,6 +58,7 @@ export class Session {
   gaze: Gaze | undefined;
   readonly map = new MapState();
   readonly annotations = new AnnotationBook();
+  readonly pointers = new PointerBook();
   readonly frames = new FrameRing<FrameFacts>(300);
   readonly path: Pose[] = [];
   readonly clock = new ClockOffset();
@@ -215,20 +212,14 @@ export class Session {
     this.lastEventMs = this.watchedMs = pageNowMs();
     this.sourceEnded = false;
     this.gaze = undefined;
+    this.pointers.clear();
     this.frames.clear();
     this.path.length = 0;
     this.clock.reset();
     this.pictures.reset();
-    this.acknowledger = new Acknowledger({
-      every: WINDOW / 4,
-      mayProceed: () => !this.pictures.behind,
-      send: async (sequence, requestKeyFrame) => {
-        await this.clients.session.acknowledge(
-          { sessionId: joined.sessionId, sequence, requestKeyFrame },
-          { signal, timeoutMs: 3000 },
-        );
-      },
-    });
+    const { clients, pictures } = this;
+    const client = clients.session;
+    this.acknowledger = acknowledge({ client, joined, pictures, every: WINDOW / 4 }, signal);
   }
 
   /** A stream that is silent without having ended: the machine or the network went away. */
@@ -275,7 +266,10 @@ export class Session {
       case 'gaze':
         this.gaze = toGaze(event.value);
         break;
-      case undefined:
+      case 'pointer':
+        this.pointers.apply(event.value, this.participantId, this.lastEventMs);
+        break;
+      default:
         break;
     }
     this.acknowledger?.arrived(sequence);
@@ -289,11 +283,8 @@ export class Session {
   }
 
   private receivePose(pose: Pose): void {
-    if (this.pose && pose.mapRevision !== this.pose.mapRevision) this.path.length = 0;
+    follow(this.path, this.pose, pose);
     this.pose = pose;
     this.poseMs = this.lastEventMs;
-    if (!isPlaced(pose)) return;
-    this.path.push(pose);
-    if (this.path.length > 9000) this.path.splice(0, 3000);
   }
 }

@@ -1,6 +1,6 @@
 import type { Camera } from '../geometry/camera';
 import type { Covariance3 } from '../geometry/covariance';
-import type { Rigid3 } from '../geometry/rigid3';
+import type { Quaternion, Rigid3 } from '../geometry/rigid3';
 import { distance, type Pixel, type Vec3 } from '../geometry/vec3';
 
 export type TrackingStatus =
@@ -13,7 +13,16 @@ export type TrackingStatus =
 export type Quality = 'unknown' | 'bad' | 'poor' | 'good';
 export type FeatureState = 'not_attempted' | 'measured' | 'failed';
 export type AnchorState = 'provisional' | 'tracking' | 'paused' | 'stopped';
-export type Shape = 'cube' | 'note' | 'arrow' | 'ink';
+export type Shape =
+  | 'cube'
+  | 'note'
+  | 'arrow'
+  | 'ink'
+  | 'box'
+  | 'measure'
+  | 'pin'
+  | 'picture'
+  | 'check_list';
 export type Role = 'expert' | 'wearer' | 'viewer';
 export type View = 'raw' | 'augmented';
 
@@ -92,11 +101,51 @@ export interface Annotation {
   readonly colorRgba: number;
   readonly createdMs: number;
   readonly anchor: Anchor;
+  /** INK: its stroke; MEASURE: its other end; from the anchor, axes parallel to world. */
   readonly inkOffsetsM: readonly Vec3[];
+  readonly authorPersonId: string; // empty: made before persons were known
+  readonly locked: boolean;
+  readonly worldFromMark: Quaternion | undefined; // undefined: axes parallel to world
+  readonly extentM: Vec3 | undefined;
+  readonly number: number; // of a pin; 0: none
+  readonly lengthM: number;
+  readonly lengthSigmaM: number;
+  readonly picture: PictureFacts | undefined;
+  readonly checkItems: readonly CheckItem[];
 }
 
+/** Of a picture pinned to a place; its bytes come by themselves. */
+export interface PictureFacts {
+  readonly sha256: string;
+  readonly width: number; // [px]
+  readonly height: number;
+}
+
+export interface CheckItem {
+  readonly text: string;
+  readonly done: boolean;
+  readonly doneBy: string; // a name; empty: nobody
+}
+
+/** What of a mark is its form, beside where it is. */
+export type MarkForm = Pick<
+  Annotation,
+  | 'shape'
+  | 'text'
+  | 'sizeM'
+  | 'colorRgba'
+  | 'inkOffsetsM'
+  | 'worldFromMark'
+  | 'extentM'
+  | 'number'
+  | 'lengthM'
+  | 'lengthSigmaM'
+  | 'picture'
+  | 'checkItems'
+>;
+
 /** A mark made here that the server has not answered yet. */
-export interface PendingAnnotation {
+export interface PendingAnnotation extends Partial<MarkForm> {
   readonly requestId: string;
   readonly shape: Shape;
   readonly text: string;
@@ -109,6 +158,8 @@ export interface Participant {
   readonly participantId: string;
   readonly name: string;
   readonly role: Role;
+  readonly personId: string;
+  readonly colorRgba: number; // the person's
 }
 
 /** The server's, over the last seconds. */

@@ -12,6 +12,8 @@ export interface Landing {
   readonly pointInWorld: Vec3;
   readonly sigmaM: number | undefined; // undefined: nothing known about the depth
   readonly depthM: number;
+  /** Of the surface there, where one was seen. */
+  readonly normalInWorld?: Vec3;
   readonly how: 'feature' | 'plane' | 'nearby depth' | 'unknown depth';
 }
 
@@ -126,7 +128,7 @@ function onPlane(
   // A slanted plane carries its error along the ray.
   const slant = Math.max(Math.abs(dot(direction, plane.normal)), 0.1);
   const sigmaM = Math.hypot(plane.residual, median(near.map(sigmaOf))) / slant;
-  return { pointInWorld: point, sigmaM, depthM, how: 'plane' };
+  return { pointInWorld: point, sigmaM, depthM, normalInWorld: plane.normal, how: 'plane' };
 }
 
 function atDepth(

@@ -4,6 +4,7 @@ import { bearing } from './access';
 import { AnnotationService } from '../gen/saccade/v1/annotation_pb';
 import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
+import { PointerService } from '../gen/saccade/v1/pointer_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
 
 export interface Clients {
@@ -11,6 +12,7 @@ export interface Clients {
   readonly annotations: Client<typeof AnnotationService>;
   readonly map: Client<typeof MapService>;
   readonly gaze: Client<typeof GazeService>;
+  readonly pointers: Client<typeof PointerService>;
 }
 
 /** gRPC-Web to the server that this page came from; `token` goes with each call, if there is one. */
@@ -22,5 +24,6 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
     annotations: createClient(AnnotationService, transport),
     map: createClient(MapService, transport),
     gaze: createClient(GazeService, transport),
+    pointers: createClient(PointerService, transport),
   };
 }

@@ -1,38 +1,32 @@
-import { colourOf } from '../scene/strokes';
-import type { Annotation } from '../session/types';
 import type { Session } from '../session/session';
+import type { Annotation } from '../session/types';
 import { isFiltering } from '../tools/mark_filter';
 import type { MarkCommandName } from '../tools/tools';
+import { AnnotationRow } from './annotation_row';
 import type { AppState } from './app_state';
-import { h, icon, setClass, setText } from './dom';
-import { ICONS } from './icons';
+import { h, setClass, setText } from './dom';
 import { MarksBar } from './marks_bar';
 import { Palette } from './palette';
-import { anchorWords, dated, shapeWord } from './words';
+import { anchorWords, dated } from './words';
 
 export interface AnnotationActions {
-  select(id: string): void;
+  /** `adds`: to those selected, or from them. */
+  select(id: string, adds: boolean): void;
   /** Shows which mark a row means; undefined: none. */
   point(id: string | undefined): void;
   remove(id: string): void;
   /** Turns the camera to it. */
   lookAt(id: string): void;
-  /** The colour of new marks, and of the selected one: 0xRRGGBBAA. */
+  /** The colour of new marks, and of the selected ones: 0xRRGGBBAA. */
   paint(colorRgba: number): void;
   startEditing(id: string): void;
+  /** A line of a check list is done, or not. */
+  tick(id: string, index: number, done: boolean): void;
   runMarks(command: MarkCommandName): void;
 }
 
 const NONE =
   'None yet. Choose a cube (C), note (N) or arrow (A), then click in the map or the video.';
-
-interface Row {
-  readonly element: HTMLElement;
-  readonly title: HTMLElement;
-  readonly state: HTMLElement;
-  readonly by: HTMLElement;
-  readonly button: HTMLElement;
-}
 
 /** Every annotation with its state and live error. */
 export class AnnotationsPanel {
@@ -40,7 +34,8 @@ export class AnnotationsPanel {
   private readonly count = h('span', { class: 'number' });
   private readonly list = h('ul', {});
   private readonly empty = h('p', { class: 'empty' });
-  private readonly rows = new Map<string, Row>();
+  private readonly rows = new Map<string, AnnotationRow>();
+  private readonly colours = new Map<string, number>(); // by person
   private readonly palette: Palette;
   readonly bar: MarksBar;
 
@@ -68,11 +63,16 @@ export class AnnotationsPanel {
     const all = this.session.annotations.list();
     const annotations = all.filter((annotation) => this.state.lists(annotation));
     const some = isFiltering(this.state.filter) ? `${annotations.length} of ` : '';
-    setText(this.count, `${some}${all.length}`);
+    const { size } = this.state.selection;
+    setText(this.count, `${size > 1 ? `${size} selected · ` : ''}${some}${all.length}`);
     this.bar.update();
     setText(this.empty, all.length === 0 ? NONE : 'None of the marks is like that.');
     this.palette.update(this.state.colorRgba);
     setClass(this.empty, 'hidden', annotations.length > 0);
+    // Who has gone is still known by the colour of then.
+    for (const { personId, colorRgba } of this.session.participants) {
+      if (personId) this.colours.set(personId, colorRgba);
+    }
     const present = new Set(annotations.map(({ id }) => id));
     for (const [id, row] of this.rows) {
       if (present.has(id)) continue;
@@ -84,54 +84,24 @@ export class AnnotationsPanel {
 
   private updateRow(annotation: Annotation): void {
     const row = this.rows.get(annotation.id) ?? this.addRow(annotation);
-    const selected = annotation.id === this.state.selectedId;
-    const { text, warn } = anchorWords(annotation, this.session.scale);
-    const words = { text: dated(text, this.session.ageMs), warn };
+    const { scale, ageMs } = this.session;
+    const words = anchorWords(annotation, scale);
     const refusal = this.state.refusal(`annotation ${annotation.id}`);
-    setText(row.title, annotation.text || shapeWord(annotation.shape));
-    setText(row.state, refusal ?? words.text);
-    const provisional = annotation.anchor.state === 'provisional';
-    setText(row.by, provisional ? 'provisional' : annotation.author);
-    setClass(row.element, 'warn', words.warn || refusal !== undefined);
-    const chosen = selected && !row.element.classList.contains('selected');
-    setClass(row.element, 'selected', selected);
-    if (chosen) row.element.scrollIntoView({ block: 'nearest' });
-    row.element.style.setProperty('--mark', colourOf(annotation));
-    row.button.setAttribute('aria-pressed', String(selected));
-    row.button.title = titleOf(annotation, words.text);
+    const hidden = this.state.hidden.has(annotation.id) ? 'hidden · ' : '';
+    const provisional = annotation.anchor.state === 'provisional' ? 'provisional · ' : '';
+    row.update(annotation, {
+      selected: this.state.selection.has(annotation.id),
+      state: refusal ?? `${hidden}${provisional}${dated(words.text, ageMs)}`,
+      warn: words.warn || refusal !== undefined,
+      metric: scale.metric,
+      authorColour: this.colours.get(annotation.authorPersonId),
+    });
   }
 
-  private addRow(annotation: Annotation): Row {
-    const { id, shape } = annotation;
-    const title = h('span', { class: 'title', dir: 'auto' });
-    const state = h('span', { class: 'state number' });
-    const by = h('span', { class: 'by' });
-    const button = h(
-      'button',
-      { class: 'pick', type: 'button' },
-      icon(ICONS[shape === 'ink' ? 'arrow' : shape]),
-      h('span', { class: 'words' }, title, by, state),
-    );
-    button.addEventListener('click', () => this.actions.select(id));
-    button.addEventListener('dblclick', () => this.actions.startEditing(id));
-    const remove = h('button', { class: 'remove', type: 'button', title: 'Delete (Del)' });
-    remove.setAttribute('aria-label', `Delete ${shapeWord(shape)}`);
-    remove.append(icon('M5.5 5.5l9 9M14.5 5.5l-9 9'));
-    remove.addEventListener('click', () => this.actions.remove(id));
-    const look = h('button', { class: 'look', type: 'button', title: 'Turn the camera to it' });
-    look.setAttribute('aria-label', `Turn the camera to this ${shapeWord(shape)}`);
-    look.append(icon(ICONS.gaze));
-    look.addEventListener('click', () => this.actions.lookAt(id));
-    const element = h('li', { 'data-id': id, 'data-shape': shape }, button, look, remove);
-    element.addEventListener('pointerenter', () => this.actions.point(id));
-    element.addEventListener('pointerleave', () => this.actions.point(undefined));
-    this.list.append(element);
-    const row: Row = { element, title, state, by, button };
-    this.rows.set(id, row);
+  private addRow(annotation: Annotation): AnnotationRow {
+    const row = new AnnotationRow(annotation, this.actions);
+    this.list.append(row.element);
+    this.rows.set(annotation.id, row);
     return row;
   }
 }
-
-/** All of it, whatever the row has room for. */
-const titleOf = ({ shape, author, text }: Annotation, state: string): string =>
-  [text, `${shapeWord(shape)} by ${author}`, state].filter(Boolean).join('\n');

@@ -2,23 +2,37 @@ import { Edits } from '../session/edits';
 import { gazeKey, hasHead } from '../session/gaze';
 import { GazePilot } from '../session/gaze_pilot';
 import { LatencyMeter, RateMeter, stageTimes } from '../session/latency';
+import { personIdOf } from '../session/me';
+import { isNameless, keepName } from '../session/name';
 import type { Session } from '../session/session';
+import { shapeOf, TOOLS } from '../tools/tools';
 import { WorkerKeeping } from '../transport/lease_keeper';
+import { Aim } from './aim';
 import { AnnotationsPanel } from './annotations_panel';
 import { AppState } from './app_state';
 import { Controller } from './controller';
-import { h, setClass } from './dom';
+import { h, setAttribute, setClass, storage } from './dom';
 import { GazeController } from './gaze_controller';
 import { GazePanel } from './gaze_panel';
 import { HandoverNotice } from './handover_notice';
+import { Grips } from './grips';
+import type { Hand } from './hand';
 import { Header } from './header';
 import { Help } from './help';
 import { InsetCorner } from './inset';
 import { handleKeys } from './keys';
+import { ListDialog } from './list_dialog';
 import { MapPane } from './map_pane';
+import { Measuring } from './measuring';
+import { NameDialog } from './name_dialog';
 import { Notes } from './notes';
+import { PictureCache } from './picture_cache';
+import { PictureDialog } from './picture_dialog';
 import type { Player } from './player';
-import { handleMapPointer, handleVideoPointer } from './pointer';
+import { Placer } from './placer';
+import { handleDrop, handleMapPointer, handleVideoPointer } from './pointer';
+import { whyNotEdit } from './rights';
+import { SelectedMarks } from './selected_marks';
 import { Sheets } from './sheets';
 import { Strip } from './strip';
 import { ToolsColumn } from './tools_column';
@@ -26,6 +40,15 @@ import { VideoPane } from './video_pane';
 
 const MAP_AT_LATEST_MS = 1500;
 const PANEL_MS = 200; // moving numbers change five times a second: readable
+
+/** What only those may use who may change something. */
+const CHANGES = new Set<string>([
+  ...TOOLS.map(({ name }) => name).filter((name) => shapeOf(name) !== undefined),
+  ...['laser', 'undo', 'redo', 'delete', 'paste', 'lock', 'reset'],
+]);
+
+const median = (values: readonly number[]): string =>
+  ([...values].sort((a, b) => a - b)[values.length >> 1] ?? 0).toFixed(2);
 
 /** The expert's page: builds it, and draws it once per screen frame. */
 export class App {
@@ -45,6 +68,7 @@ export class App {
   private readonly pilot: GazePilot;
   private readonly gaze: GazePanel;
   private readonly notice: HandoverNotice;
+  private readonly hand: Hand;
   private readonly stage = h('main', {});
   private mapLoading = false;
   private panelsMs = 0;
@@ -56,13 +80,26 @@ export class App {
     token: () => string,
   ) {
     const { state } = this;
-    this.map = new MapPane(session, player, state);
-    this.video = new VideoPane(session, player, state);
+    const edits = new Edits(session);
+    const pictures = new PictureCache(
+      (id) => edits.picture(id),
+      () => state.moved(),
+    );
+    this.map = new MapPane(session, player, state, pictures);
+    this.video = new VideoPane(session, player, state, pictures);
     this.pilot = new GazePilot(session, new WorkerKeeping(location.origin, token));
     const gaze = new GazeController(session, this.pilot, state);
-    const edits = new Edits(session);
     const notes = new Notes(session, edits, state);
-    const controller = new Controller(session, edits, state, this.map, this.video, gaze, notes);
+    const aim = new Aim(session, state, this.map, this.video);
+    const measuring = new Measuring(session, edits, state);
+    const dialogs = { list: new ListDialog(), picture: new PictureDialog() };
+    const controller = new Controller(session, edits, state, {
+      ...{ aim, gaze, notes, measuring },
+      placer: new Placer(session, edits, state, aim, notes, measuring, dialogs),
+      grips: new Grips(session, edits, state, aim),
+      selected: new SelectedMarks(session, edits, state, aim),
+    });
+    this.hand = controller.hand;
     this.tools = new ToolsColumn(controller);
     this.annotations = new AnnotationsPanel(session, state, controller, notes.editor.element);
     this.gaze = new GazePanel(session, this.pilot, state, gaze);
@@ -77,10 +114,15 @@ export class App {
       this.strip.element,
       this.sheets.element,
       this.help.dialog,
+      dialogs.list.dialog,
+      dialogs.picture.dialog,
     );
     notes.listen();
-    handleMapPointer(this.map, controller.mapGestures());
-    handleVideoPointer(this.video.element, controller.videoGestures());
+    handleMapPointer(this.map, controller.hand.gestures('map'));
+    handleVideoPointer(this.video.element, controller.hand.gestures('video'));
+    for (const pane of ['map', 'video'] as const) {
+      handleDrop(this[pane].element, (x, y, file) => controller.drop(pane, x, y, file));
+    }
     handleKeys(controller, gaze, this.map, this.video, this.help, () => {
       state.sheet = 'marks';
       this.element.dataset['sheet'] = 'marks'; // the field must be there to be given the keyboard
@@ -89,10 +131,23 @@ export class App {
   }
 
   start(): void {
+    this.askName();
     window.addEventListener('pagehide', () => this.pilot.leave());
     // The first picture comes first; three.js, the larger part of the page, after it.
     setTimeout(() => this.loadMap(), MAP_AT_LATEST_MS);
     requestAnimationFrame((nowMs) => this.frame(nowMs));
+  }
+
+  /** Once: whoever has said it, or came with it, is not asked again. */
+  private askName(): void {
+    if (!isNameless(location.search, storage())) return;
+    const dialog = new NameDialog(this.session.displayName, (name) => {
+      keepName(name, storage());
+      this.header.setName(name);
+      this.session.rename(name);
+    });
+    this.element.append(dialog.dialog);
+    dialog.ask();
   }
 
   private loadMap(): void {
@@ -105,23 +160,23 @@ export class App {
     requestAnimationFrame((next) => this.frame(next));
     this.screen.add(nowMs);
     const { state, session, player } = this;
-    this.stage.dataset['main'] = state.main;
-    this.element.dataset['sheet'] = state.sheet ?? '';
+    setAttribute(this.stage, 'data-main', state.main);
+    setAttribute(this.element, 'data-sheet', state.sheet ?? '');
     if (player.draw()) {
       this.measure();
       this.element.dataset['firstPictureMs'] ??= performance.now().toFixed(0);
       this.loadMap();
     }
+    this.hand.tickDrags();
     this.video.draw();
     this.map.draw(nowMs, this.screen.rate(nowMs));
     this.placeInset(nowMs);
     state.expire(nowMs);
-    const me = session.participants.find((each) => each.participantId === session.participantId);
-    state.myName = me?.name ?? session.displayName;
+    this.meet();
     this.notice.update(nowMs);
     this.pilot.check();
     const version = [
-      ...[state.version, session.annotations.version, session.link.kind],
+      ...[state.version, session.annotations.changes, session.link.kind],
       ...[this.pilot.version, gazeKey(session.gaze)],
     ].join();
     if (version === this.panelsVersion && nowMs - this.panelsMs < PANEL_MS) return;
@@ -130,10 +185,10 @@ export class App {
     this.element.dataset['link'] = session.link.kind;
     this.header.update(session, player, this.meter);
     this.strip.update(session, this.meter, this.screen.rate(nowMs));
-    this.tools.update(state, {
-      follow: this.map.map?.following ?? false,
-      freeze: this.video.frozen,
-    });
+    const on = { follow: this.map.map?.following ?? false, freeze: this.video.frozen };
+    this.tools.update(state, on, (name) => (CHANGES.has(name) ? whyNotEdit(session) : undefined));
+    this.element.dataset['overlayMs'] =
+      `${median(this.video.overlayMs)} ${median(this.map.overlayMs)}`;
     this.annotations.update();
     this.sheets.update(session.annotations.list().length);
     this.gaze.update();
@@ -141,13 +196,22 @@ export class App {
     if (hasHead(session.gaze)) this.pilot.warm();
   }
 
+  /** Who sits here, as the server has it; new marks have the person's colour until another is chosen. */
+  private meet(): void {
+    const { state, session } = this;
+    const me = session.participants.find((each) => each.participantId === session.participantId);
+    state.me = { name: me?.name ?? session.displayName, personId: personIdOf(session) };
+    const colour = session.joined?.colorRgba ?? 0;
+    if (state.colourChosen || colour === 0 || colour === state.colorRgba) return;
+    state.colorRgba = colour;
+    state.changed();
+  }
+
   /** The video keeps off the wearer's camera in the map. */
   private placeInset(nowMs: number): void {
-    const { clientWidth: width, clientHeight: height } = this.video.element;
-    const { element } = this.map;
-    const pane = { width: element.clientWidth, height: element.clientHeight };
     const camera = this.state.main === 'map' ? this.map.cameraAt() : undefined;
-    this.stage.dataset['corner'] = this.inset.update(nowMs, camera, pane, { width, height });
+    const corner = this.inset.update(nowMs, camera, this.map.shape, this.video.shape);
+    if (this.stage.dataset['corner'] !== corner) this.stage.dataset['corner'] = corner;
   }
 
   private measure(): void {

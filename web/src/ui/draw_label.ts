@@ -26,6 +26,68 @@ export interface Box {
 const overlap = (a: Box, b: Box): boolean =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
+interface Sprite {
+  readonly canvas: HTMLCanvasElement;
+  readonly width: number;
+  readonly height: number;
+}
+
+// Text is slow to measure and to draw, and the same from frame to frame: what was drawn once is copied.
+const MOST_KEPT = 600;
+const sprites = new Map<string, Sprite>();
+const widths = new Map<string, number>();
+const laidOut = new Map<string, string[]>();
+
+function remember<T>(kept: Map<string, T>, key: string, make: () => T): T {
+  const known = kept.get(key);
+  if (known !== undefined) return known;
+  if (kept.size >= MOST_KEPT) kept.clear();
+  const made = make();
+  kept.set(key, made);
+  return made;
+}
+
+const fontAt = (ratio: number): string => FONT.replace('13', String(13 * ratio));
+
+function spriteOf(
+  lines: readonly string[],
+  width: number,
+  ratio: number,
+  { colour, hollow }: { readonly colour: string; readonly hollow: boolean },
+): Sprite {
+  return remember(sprites, `${ratio} ${colour} ${hollow} ${lines.join('\n')}`, () => {
+    const inset = INSET_PX * ratio;
+    const step = STEP_PX * ratio;
+    const edge = Math.ceil(ratio);
+    const height = step * lines.length + 4 * ratio;
+    const canvas = document.createElement('canvas');
+    canvas.width = Math.ceil(width) + 2 * edge;
+    canvas.height = Math.ceil(height) + 2 * edge;
+    const context = canvas.getContext('2d');
+    if (!context) return { canvas, width, height };
+    context.translate(edge, edge);
+    context.font = fontAt(ratio);
+    context.fillStyle = 'rgba(16, 17, 18, 0.86)';
+    context.strokeStyle = colour;
+    context.lineWidth = 1.5 * ratio;
+    if (hollow) context.setLineDash([4 * ratio, 4 * ratio]);
+    context.beginPath();
+    context.roundRect(0, 0, width, height, 4 * ratio);
+    context.fill();
+    context.stroke();
+    context.fillStyle = colour;
+    context.textBaseline = 'middle';
+    lines.forEach((line, i) => {
+      const rightToLeft = readsRightToLeft(line);
+      context.direction = rightToLeft ? 'rtl' : 'ltr';
+      context.textAlign = rightToLeft ? 'right' : 'left';
+      const from = rightToLeft ? width - inset : inset;
+      context.fillText(line, from, step * (i + 0.5) + 2.5 * ratio);
+    });
+    return { canvas, width, height };
+  });
+}
+
 /**
  * A filled box with text, its lower left corner beside a point. Where it would lie over one of `taken`
  * it is left out, and otherwise joins them: of a crowd of marks some can be read, and each when chosen.
@@ -34,15 +96,23 @@ export function drawLabel(
   context: CanvasRenderingContext2D,
   { text, whole }: { readonly text: string; readonly whole: string },
   { x: atX, y: atY, ratio, pane }: LabelPlace,
-  { colour, hollow }: { readonly colour: string; readonly hollow: boolean },
+  look: { readonly colour: string; readonly hollow: boolean },
   taken?: Box[],
 ): void {
-  context.font = FONT.replace('13', String(13 * ratio));
-  const widthOf = (line: string): number => context.measureText(line).width;
+  const widthOf = (line: string): number =>
+    remember(widths, `${ratio} ${line}`, () => {
+      context.font = fontAt(ratio);
+      return context.measureText(line).width;
+    });
   const inset = INSET_PX * ratio;
   const step = STEP_PX * ratio;
   const most = pane && Math.min(MAX_LINE_PX * ratio, pane.width - 4 * inset);
-  let lines = most === undefined ? [text] : wrap(whole, (line) => widthOf(line) <= most);
+  let lines = [text];
+  if (most !== undefined) {
+    lines = remember(laidOut, `${ratio} ${most.toFixed(0)} ${whole}`, () =>
+      whole.split('\n').flatMap((line) => wrap(line, (some) => widthOf(some) <= most)),
+    );
+  }
   // Not where it would hide what it is about; the large pane and the list have the room.
   if (pane && lines.length * step > MOST_OF_PANE * pane.height) lines = [text];
   const width = Math.max(...lines.map(widthOf)) + 2 * inset;
@@ -56,24 +126,7 @@ export function drawLabel(
   const box = { x, y, width, height };
   if (taken?.some((other) => overlap(box, other))) return;
   taken?.push(box);
-  context.fillStyle = 'rgba(16, 17, 18, 0.86)';
-  context.strokeStyle = colour;
-  context.lineWidth = 1.5 * ratio;
-  if (hollow) context.setLineDash([4 * ratio, 4 * ratio]);
-  context.beginPath();
-  context.roundRect(x, y, width, height, 4 * ratio);
-  context.fill();
-  context.stroke();
-  context.setLineDash([]);
-  context.fillStyle = colour;
-  context.textBaseline = 'middle';
-  lines.forEach((line, i) => {
-    const rightToLeft = readsRightToLeft(line);
-    context.direction = rightToLeft ? 'rtl' : 'ltr';
-    context.textAlign = rightToLeft ? 'right' : 'left';
-    const from = rightToLeft ? x + width - inset : x + inset;
-    context.fillText(line, from, y + step * (i + 0.5) + 2.5 * ratio);
-  });
-  context.direction = 'ltr';
-  context.textAlign = 'left';
+  const edge = Math.ceil(ratio);
+  const { canvas } = spriteOf(lines, width, ratio, look);
+  context.drawImage(canvas, Math.round(x) - edge, Math.round(y) - edge);
 }

@@ -1,7 +1,8 @@
 import { charactersOf } from '../scene/characters';
 import { type Gaze, type HeadAngles, ownHandover } from '../session/gaze';
 import type { Lease } from '../session/gaze_pilot';
-import type { Annotation, Participant } from '../session/types';
+import type { Annotation, Participant, Shape } from '../session/types';
+import { shapeWord } from './words';
 
 /** What the head does, in words; a shape beside them, never colour alone. */
 export interface GazeWords {
@@ -55,7 +56,7 @@ export function targetWords({ gaze, annotation }: GazeInput): string {
   switch (gaze?.target?.kind) {
     case 'annotation':
       if (!annotation) return 'a mark';
-      return annotation.text ? `“${shorten(annotation.text)}”` : SHAPE_WORDS[annotation.shape];
+      return annotation.text ? `“${shorten(annotation.text)}”` : aShape(annotation.shape);
     case 'feature':
       return `feature ${gaze.target.featureId}`;
     case 'point':
@@ -65,7 +66,7 @@ export function targetWords({ gaze, annotation }: GazeInput): string {
   }
 }
 
-const SHAPE_WORDS = { cube: 'a cube', note: 'a note', arrow: 'an arrow', ink: 'a stroke' } as const;
+const aShape = (shape: Shape): string => `${shape === 'arrow' ? 'an' : 'a'} ${shapeWord(shape)}`;
 
 function shorten(text: string): string {
   const characters = charactersOf(text);

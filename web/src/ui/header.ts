@@ -2,6 +2,8 @@ import { pageNowMs } from '../session/clock';
 import type { LatencyMeter } from '../session/latency';
 import { cleanName, keepName, MAX_NAME_BYTES, recallName } from '../session/name';
 import type { Session } from '../session/session';
+import type { Participant } from '../session/types';
+import { colourOf } from '../scene/strokes';
 import { bytesOf } from '../tools/note_text';
 import { h, setClass, setText, storage } from './dom';
 import type { Player } from './player';
@@ -26,9 +28,14 @@ export class Header {
     class: 'number',
     title: 'from the middle of the exposure to this screen, median of the last 90 pictures',
   });
-  private readonly presence = h('span', { class: 'presence' });
+  private readonly people = h('span', { class: 'people' });
+  private readonly count = h('span', { class: 'count' });
+  private readonly presence = h('span', { class: 'presence' }, this.people, this.count);
+  private readonly name: NameField;
+  private shownPeople = '';
 
   constructor(helpButton: HTMLElement, rename: (name: string) => void) {
+    this.name = new NameField(rename);
     this.element = h(
       'header',
       {},
@@ -39,7 +46,7 @@ export class Header {
       this.rate,
       this.latency,
       this.presence,
-      nameField(rename),
+      this.name.input,
       helpButton,
     );
   }
@@ -60,41 +67,67 @@ export class Header {
     const live = session.live && fps > 0;
     setText(this.rate, live ? `${fps.toFixed(0)} fps` : '– fps');
     setText(this.latency, live && total !== undefined ? `${total.toFixed(0)} ms` : '– ms');
-    setText(this.presence, session.live ? presenceWords(participants) : '');
+    this.showPeople(session.live ? participants : []);
+  }
+
+  /** By name where there is room, else how many; each with the colour of what is theirs. */
+  private showPeople(participants: readonly Participant[]): void {
+    const key = JSON.stringify(participants);
+    if (key === this.shownPeople) return;
+    this.shownPeople = key;
+    setText(this.count, presenceWords(participants));
+    this.presence.title = participants.map(({ name, role }) => `${name}, ${role}`).join('\n');
+    this.people.replaceChildren(
+      ...participants.slice(0, MOST_PEOPLE).map(({ name, role, colorRgba }) => {
+        const dot = h('span', { class: 'person', 'aria-hidden': 'true' });
+        dot.style.setProperty('--person', colourOf({ colorRgba: colorRgba || 0xa9aeb4ff }));
+        const words = role === 'expert' ? name : `${name} (${role})`;
+        return h('span', { class: 'participant' }, dot, h('span', { class: 'who' }, words));
+      }),
+    );
+  }
+
+  /** A name that was given elsewhere. */
+  setName(name: string): void {
+    this.name.set(name);
   }
 }
 
+const MOST_PEOPLE = 6;
+
 /** Who I am, as the others see it. */
-function nameField(rename: (name: string) => void): HTMLElement {
-  const input = h('input', {
-    class: 'name',
-    type: 'text',
-    autocomplete: 'nickname',
-    'aria-label': 'Your name',
-    title:
-      'Your name, as the others see it. A new one begins a new session: what you did before it can no longer be undone.',
+class NameField {
+  readonly input = h('input', {
+    ...{ class: 'name', type: 'text', autocomplete: 'nickname', 'aria-label': 'Your name' },
+    title: 'Your name, as the others see it. What you have done stays yours under a new one.',
   });
-  let name = recallName(location.search, storage());
-  input.value = name;
-  // Said, and left as it is: nobody is called half a name without knowing it.
-  input.addEventListener('input', () => {
-    const left = MAX_NAME_BYTES - bytesOf(input.value.trim());
-    input.setCustomValidity(left < 0 ? `${-left} bytes too long` : '');
-    input.reportValidity();
-  });
-  input.addEventListener('change', () => {
-    if (!input.checkValidity()) return;
-    name = cleanName(input.value) || name;
-    input.value = name;
-    keepName(name, storage());
-    rename(name);
-  });
-  input.addEventListener('keydown', ({ key }) => {
-    if (key === 'Escape') {
-      input.value = name;
-      input.setCustomValidity('');
-    }
-    if (key === 'Enter' || key === 'Escape') input.blur();
-  });
-  return input;
+  private name = recallName(location.search, storage());
+
+  constructor(rename: (name: string) => void) {
+    const { input } = this;
+    input.value = this.name;
+    // Said, and left as it is: nobody is called half a name without knowing it.
+    input.addEventListener('input', () => {
+      const left = MAX_NAME_BYTES - bytesOf(input.value.trim());
+      input.setCustomValidity(left < 0 ? `${-left} bytes too long` : '');
+      input.reportValidity();
+    });
+    input.addEventListener('change', () => {
+      if (!input.checkValidity()) return;
+      this.set(cleanName(input.value) || this.name);
+      keepName(this.name, storage());
+      rename(this.name);
+    });
+    input.addEventListener('keydown', ({ key }) => {
+      if (key === 'Escape') {
+        input.value = this.name;
+        input.setCustomValidity('');
+      }
+      if (key === 'Enter' || key === 'Escape') input.blur();
+    });
+  }
+
+  set(name: string): void {
+    this.name = this.input.value = name;
+  }
 }

@@ -1,4 +1,4 @@
-import { COMMANDS, HEAD_COMMANDS, MARK_COMMANDS, TOOLS } from '../tools/tools';
+import { COMMANDS, HEAD_COMMANDS, MARK_COMMANDS, TOOLS, TURNS } from '../tools/tools';
 import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { FeatureState } from '../session/types';
 import { h } from './dom';
@@ -23,6 +23,7 @@ export class Help {
     for (const { label, shown, hint } of [
       ...TOOLS,
       ...COMMANDS,
+      ...TURNS,
       ...HEAD_COMMANDS,
       ...MARK_COMMANDS,
     ]) {
@@ -31,6 +32,12 @@ export class Help {
     keys.append(
       h('dt', {}, h('kbd', {}, '/'), 'Find'),
       h('dd', {}, 'find marks by text, shape, author'),
+      h('dt', {}, h('kbd', {}, '^A'), 'All'),
+      h('dd', {}, 'select all marks that are drawn'),
+      h('dt', {}, h('kbd', {}, 'F2'), 'Words'),
+      h('dd', {}, 'change the words of the selected mark; or double-click its row'),
+      h('dt', {}, h('kbd', {}, 'Esc'), 'Give up'),
+      h('dd', {}, 'what is under way, then the tool, then the selection'),
     );
     const legend = h('ul', { class: 'legend' });
     const explain = (colour: string, sign: string, words: string): void => {
@@ -49,11 +56,11 @@ export class Help {
       keys,
       h('h2', {}, 'Features'),
       legend,
-      h('h2', {}, 'Map'),
+      h('h2', {}, 'By hand'),
       h(
         'p',
         {},
-        'Drag to orbit, right-drag or Shift-drag to pan, wheel to zoom; on a touch screen one finger, two fingers, pinch. With the map focused: arrow keys orbit, plus and minus zoom, Enter places at the middle.',
+        'Drag to orbit, right-drag or Shift-drag to pan, wheel to zoom; on a touch screen one finger, two fingers, pinch. With the map focused: arrow keys orbit, plus and minus zoom, Enter clicks in the middle. With the video focused: arrow keys move the place that Enter clicks at. Tools that are pressed and moved are held from one Enter to the next.',
       ),
       close,
     );

@@ -7,6 +7,7 @@ import {
   type MarkCommandName,
   type ToolName,
   TOOLS,
+  turnOf,
 } from '../tools/tools';
 import type { Controller } from './controller';
 import { isComposing, isTextField } from './dom';
@@ -34,10 +35,19 @@ export function handleKeys(
   find: () => void,
 ): void {
   document.addEventListener('keydown', (event) => {
-    if (isTextField(event.target) || isComposing(event) || help.dialog.open) return;
+    if (isTextField(event.target) || isComposing(event) || isAsking()) return;
+    const turn = turnOf(event);
+    if (turn && controller.turn(turn.sign, turn.tips)) event.preventDefault();
+    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === 'a') {
+      event.preventDefault();
+      controller.selectAll();
+    }
     const name = controlOf(event);
+    // What is marked as text is what is copied then.
+    if (name === 'copy' && !getSelection()?.isCollapsed) return;
     if (event.key === '?') help.toggle();
     if (event.key === 'Escape') controller.escape();
+    if (event.key === 'F2') controller.editSelected();
     if (event.key === '/' && !event.ctrlKey && !event.metaKey && !event.altKey) {
       event.preventDefault();
       find();
@@ -55,11 +65,37 @@ export function handleKeys(
     event.preventDefault();
   });
   video.element.addEventListener('keydown', (event) => {
-    if (event.target !== video.element || event.key !== 'Enter') return;
-    event.preventDefault(); // it is not the first line of a note that this opens
-    if (!event.repeat) controller.clickMiddle('video');
+    if (event.target !== video.element) return;
+    if (event.key === 'Enter') {
+      event.preventDefault(); // it is not the first line of a note that this opens
+      if (!event.repeat) controller.hand.keyPress('video', event.shiftKey);
+    } else if (moveCursor(event, controller)) {
+      event.preventDefault();
+    }
   });
 }
+
+const STEP = 0.01; // of the pane
+const LONG_STEP = 0.06;
+
+/** The keyboard's place in the video. */
+function moveCursor({ key, shiftKey }: KeyboardEvent, { hand }: Controller): boolean {
+  const step = shiftKey ? LONG_STEP : STEP;
+  const [dx, dy] = ARROWS[key] ?? [0, 0];
+  if (dx === 0 && dy === 0) return false;
+  hand.moveCursor(dx * step, dy * step);
+  return true;
+}
+
+const ARROWS: Partial<Record<string, readonly [number, number]>> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, -1],
+  ArrowDown: [0, 1],
+};
+
+/** A dialog has the keyboard. */
+const isAsking = (): boolean => document.querySelector('dialog[open]') !== null;
 
 function moveMap(event: KeyboardEvent, pane: MapPane, controller: Controller): boolean {
   const { map } = pane;
@@ -90,11 +126,12 @@ function moveMap(event: KeyboardEvent, pane: MapPane, controller: Controller): b
       map.orbit.zoom(1 / 0.85);
       break;
     case 'Enter':
-      if (!event.repeat) controller.clickMiddle('map');
+      if (!event.repeat) controller.hand.keyPress('map', event.shiftKey);
       return true;
     default:
       return false;
   }
   map.hold();
+  requestAnimationFrame(() => controller.hand.keyMoved('map')); // once it is drawn from there
   return true;
 }

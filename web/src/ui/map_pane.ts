@@ -2,26 +2,26 @@ import type { Pixel } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
 import { lineOfSight } from '../scene/gaze_sight';
 import type { MapView } from '../scene/map_view';
+import { pageNowMs } from '../session/clock';
 import { gazeKey } from '../session/gaze';
 import type { Session } from '../session/session';
 import { isPlaced } from '../session/types';
 import type { AppState } from './app_state';
 import { h } from './dom';
 import { Pane } from './pane';
+import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
 
 /** The 3D map: three.js below, the same marks as on the video above it. */
 export class MapPane extends Pane {
   map: MapView | undefined; // arrives after the video: three.js is the larger part of the page
   private readonly canvas: HTMLCanvasElement;
-  private drawnState = -1;
-  private drawnAnnotations = -1;
-  private drawnGaze = '';
+  private drawnKey = '';
 
-  constructor(session: Session, player: Player, state: AppState) {
+  constructor(session: Session, player: Player, state: AppState, pictures: PictureCache) {
     const canvas = h('canvas', { class: 'map' });
     const words = { className: 'map3d', label: '3D map', title: 'Map' };
-    super('map', words, [canvas], session, player, state);
+    super('map', words, [canvas], session, player, state, pictures);
     this.canvas = canvas;
   }
 
@@ -64,11 +64,10 @@ export class MapPane extends Pane {
 
   /** `screenFps`: what this computer manages; with little, the map yields to the video. */
   draw(nowMs: number, screenFps: number): void {
-    const { map, element } = this;
+    const { map } = this;
+    const { width, height } = this.size;
     this.updateNote();
     if (!map) return;
-    const width = element.clientWidth;
-    const height = element.clientHeight;
     map.resize(width, height);
     map.pictureIntervalMs = screenFps > 0 && screenFps < 45 ? 150 : 0;
     const shown = this.player.shown?.facts;
@@ -81,12 +80,13 @@ export class MapPane extends Pane {
     );
     const { version } = this.session.annotations;
     const gaze = gazeKey(this.session.gaze);
-    const changed = version !== this.drawnAnnotations || gaze !== this.drawnGaze;
-    if (!moved && !changed && this.state.version === this.drawnState) return;
-    this.drawnAnnotations = version;
-    this.drawnGaze = gaze;
-    this.drawnState = this.state.version;
+    this.session.pointers.list(pageNowMs()); // forgets those that are silent
+    const key = `${version} ${gaze} ${this.state.drawn} ${this.session.pointers.version}`;
+    if (!moved && key === this.drawnKey) return;
+    this.drawnKey = key;
+    const begin = performance.now();
     this.drawOver(map.view(), width, height);
+    this.took(performance.now() - begin);
   }
 
   private drawOver(view: View, width: number, height: number): void {

@@ -47,10 +47,10 @@ export class MarksBar {
   }
 
   update(): void {
-    const { filter, hideMarks } = this.state;
+    const { filter, hideMarks, hidden } = this.state;
     for (const [name, on] of [
       ['mine', filter.mine],
-      ['hide', hideMarks],
+      ['hide', hideMarks || hidden.size > 0],
     ] as const) {
       const button = this.buttons.get(name);
       if (!button) continue;

@@ -1,10 +1,12 @@
-import { EditError, type Edits, newUuid } from '../session/edits';
+import { EditError, type Edits } from '../session/edits';
 import type { Session } from '../session/session';
+import { newUuid } from '../session/uuid';
 import type { Landing } from '../tools/landing';
 import { bytesOf, cleanText, MAX_TEXT_BYTES, roomWords } from '../tools/note_text';
 import type { AppState } from './app_state';
 import { isTextField } from './dom';
 import { KEEPS_OPEN, NoteEditor } from './note_editor';
+import { shapeWord } from './words';
 
 /** Where a new note is to stand. */
 interface Spot {
@@ -74,7 +76,7 @@ export class Notes {
   /** The text of a note that is there already. */
   edit(id: string): void {
     const annotation = this.session.annotations.get(id);
-    if (annotation?.shape !== 'note') return;
+    if (!annotation) return;
     if (this.draft && !this.finish()) return;
     this.put({ id, text: annotation.text, problem: '', spot: undefined, pendingId: '' });
   }
@@ -129,7 +131,7 @@ export class Notes {
     const { id, text, spot } = draft;
     try {
       if (id) {
-        await edits.setText(id, text);
+        await edits.change(id, { text });
       } else if (spot) {
         const { target, pointInWorld } = spot.landing;
         const later = this.sameMap(spot) ? spot.landing.later : undefined;
@@ -161,11 +163,16 @@ export class Notes {
     this.draft = draft;
     if (draft) {
       this.state.selectedId = draft.id || undefined; // a colour chosen now is for this one
-      this.editor.open(draft.id ? 'Note' : 'New note', draft.text, draft.problem);
+      this.editor.open(draft.id ? this.nameOf(draft.id) : 'New note', draft.text, draft.problem);
     } else {
       this.editor.close();
     }
     this.state.changed();
+  }
+
+  private nameOf(id: string): string {
+    const shape = this.session.annotations.get(id)?.shape ?? 'note';
+    return shape === 'note' ? 'Note' : `Words of this ${shapeWord(shape)}`;
   }
 
   /** Shown hollow where it will stand, until it is placed. */

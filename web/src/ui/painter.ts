@@ -1,156 +1,34 @@
 import type { Pixel } from '../geometry/vec3';
 import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { EdgeArrow } from '../scene/edge_arrows';
-import type { AxisStroke, Label, Marks } from '../scene/strokes';
+import type { AxisStroke } from '../scene/strokes';
 import type { FeatureState } from '../session/types';
-import { type Box, drawLabel, FONT } from './draw_label';
+import { FONT } from './draw_label';
+import { MarkPainter } from './mark_painter';
+import { ACCENT, HALO, LINE } from './surface';
 
-const LINE = '#ffffff';
-const ACCENT = '#c4b0ff';
-const HALO = 'rgba(0, 0, 0, 0.65)';
 const AXIS = '#c9ccd0';
 const MAX_RING_PX = 120;
 
-/** Draws pixels of a view onto a canvas laid over it. */
-export class Painter {
-  readonly canvas = document.createElement('canvas');
-  private readonly context: CanvasRenderingContext2D;
-  private scale = 1; // canvas px per picture px
-  private left = 0;
-  private top = 0;
-  private ratio = 1;
-  private right = 0; // edge of what is drawn on [canvas px]
-
-  /** `ratio`: canvas pixels per CSS pixel; by default the screen's. */
-  constructor(private readonly fixedRatio?: number) {
-    this.canvas.className = 'marks';
-    const context = this.canvas.getContext('2d');
-    if (!context) throw new Error('this browser has no 2D canvas');
-    this.context = context;
-  }
-
-  /** Clears, and maps picture pixels so that the picture fills `rect` (CSS px in the pane). */
-  begin(
-    pane: { width: number; height: number },
-    rect: { left: number; top: number; scale: number },
-  ): void {
-    this.ratio = this.fixedRatio ?? Math.min(window.devicePixelRatio, 2);
-    const width = Math.round(pane.width * this.ratio);
-    const height = Math.round(pane.height * this.ratio);
-    if (this.canvas.width !== width) this.canvas.width = width;
-    if (this.canvas.height !== height) this.canvas.height = height;
-    this.right = width;
-    this.context.clearRect(0, 0, width, height);
-    this.scale = rect.scale * this.ratio;
-    this.left = rect.left * this.ratio;
-    this.top = rect.top * this.ratio;
-    this.context.lineCap = 'round';
-    this.context.lineJoin = 'round';
-  }
-
-  /** Restricts drawing to the picture; `end` lifts it. */
-  clip(width: number, height: number): void {
-    this.right = this.left + width * this.scale;
-    this.context.save();
-    this.context.beginPath();
-    this.context.rect(this.left, this.top, width * this.scale, height * this.scale);
-    this.context.clip();
-  }
-
-  end(): void {
-    this.context.restore();
-  }
-
-  private x(p: Pixel): number {
-    return this.left + (p.u + 0.5) * this.scale;
-  }
-
-  private y(p: Pixel): number {
-    return this.top + (p.v + 0.5) * this.scale;
-  }
-
-  private trace(points: readonly Pixel[]): void {
-    this.context.beginPath();
-    points.forEach((p, i) => {
-      if (i === 0) this.context.moveTo(this.x(p), this.y(p));
-      else this.context.lineTo(this.x(p), this.y(p));
-    });
-  }
-
-  private stroke(style: string, width: number): void {
-    this.context.strokeStyle = style;
-    this.context.lineWidth = width * this.ratio;
-    this.context.stroke();
-  }
-
-  /** Lines with a dark halo, a hollow one dashed; accented ones in that colour and above the rest. */
-  marks({ strokes, labels }: Marks, accented: readonly (string | undefined)[]): void {
-    const chosen = (id: string): boolean => id !== '' && accented.includes(id);
-    for (const { points } of strokes) {
-      this.trace(points);
-      this.stroke(HALO, 5);
-    }
-    const below = strokes.filter(({ annotationId }) => !chosen(annotationId));
-    const above = strokes.filter(({ annotationId }) => chosen(annotationId));
-    for (const { points, hollow, annotationId, colour } of [...below, ...above]) {
-      if (hollow) this.context.setLineDash([5 * this.ratio, 5 * this.ratio]);
-      this.trace(points);
-      this.stroke(chosen(annotationId) ? ACCENT : colour, 2);
-      this.context.setLineDash([]);
-    }
-    const topmost = labels.filter(({ annotationId }) => chosen(annotationId));
-    const taken: Box[] = [];
-    const others = labels.filter(({ annotationId }) => !chosen(annotationId));
-    for (const label of others.reverse()) this.label(label, label.colour, false, taken); // newest first
-    // The chosen one says all it has to say, where there is room for it.
-    for (const label of topmost) this.label(label, ACCENT, true);
-  }
-
-  private label(label: Label, colour: string, whole: boolean, taken?: Box[]): void {
-    const { at, hollow } = label;
-    const pane = whole ? { width: this.right, height: this.canvas.height } : undefined;
-    const place = { x: this.x(at), y: this.y(at), ratio: this.ratio, pane };
-    drawLabel(this.context, label, place, { colour, hollow }, taken);
-  }
-
-  /** Towards marks outside the picture: filled, or an outline where not to be trusted. */
-  edgeArrows(arrows: readonly EdgeArrow[], accented: readonly (string | undefined)[]): void {
-    const size = this.ratio * this.thinning;
-    for (const { tip, direction, hollow, annotationId, colour } of arrows) {
-      const [x, y] = [this.x(tip), this.y(tip)];
-      const [du, dv] = [direction.u * size, direction.v * size];
-      this.context.beginPath();
-      this.context.moveTo(x, y);
-      this.context.lineTo(x - 18 * du - 10 * dv, y - 18 * dv + 10 * du);
-      this.context.lineTo(x - 18 * du + 10 * dv, y - 18 * dv - 10 * du);
-      this.context.closePath();
-      this.stroke(HALO, 6);
-      const chosen = annotationId !== '' && accented.includes(annotationId);
-      this.context.fillStyle = chosen ? ACCENT : colour;
-      if (!hollow) this.context.fill();
-      this.stroke(chosen ? ACCENT : colour, 2);
-    }
-  }
-
-  /** Signs are smaller on a small picture, where they lie closer together. */
-  private get thinning(): number {
-    return Math.min(Math.max(this.scale / this.ratio, 0.6), 1.1);
-  }
-
-  /** Colour and shape by state: disc measured, cross failed, ring not attempted. */
-  feature(at: Pixel, state: FeatureState): void {
+/** Draws pixels of a view onto a canvas laid over it: marks, and what the tracker and the head are at. */
+export class Painter extends MarkPainter {
+  /** Colour and shape by state: disc measured, cross failed, ring not attempted; all of one state at once. */
+  features(state: FeatureState, places: readonly Pixel[]): void {
     const { context, ratio } = this;
-    const x = this.x(at);
-    const y = this.y(at);
     const r = 3.5 * ratio * this.thinning;
     context.beginPath();
-    if (state === 'failed') {
-      context.moveTo(x - r, y - r);
-      context.lineTo(x + r, y + r);
-      context.moveTo(x + r, y - r);
-      context.lineTo(x - r, y + r);
-    } else {
-      context.arc(x, y, r, 0, 2 * Math.PI);
+    for (const at of places) {
+      const x = this.x(at);
+      const y = this.y(at);
+      if (state === 'failed') {
+        context.moveTo(x - r, y - r);
+        context.lineTo(x + r, y + r);
+        context.moveTo(x + r, y - r);
+        context.lineTo(x - r, y + r);
+      } else {
+        context.moveTo(x + r, y);
+        context.arc(x, y, r, 0, 2 * Math.PI);
+      }
     }
     this.stroke(HALO, 4);
     context.fillStyle = FEATURE_CSS[state];
@@ -238,18 +116,6 @@ export class Painter {
       TARGET_CSS,
     );
     context.textAlign = 'left';
-  }
-
-  /** With a halo, from the middle of the line [canvas px]. */
-  private words(text: string, x: number, y: number, colour: string): void {
-    const { context, ratio } = this;
-    context.font = FONT.replace('13', String(12 * ratio));
-    context.textBaseline = 'middle';
-    context.lineWidth = 3.5 * ratio;
-    context.strokeStyle = HALO;
-    context.strokeText(text, x, y);
-    context.fillStyle = colour;
-    context.fillText(text, x, y);
   }
 
   axes(axes: readonly AxisStroke[]): void {

@@ -2,7 +2,8 @@ import type { AccessUnit } from '../gen/saccade/v1/video_pb';
 import { Decoder } from '../decode/decoder';
 import { pageNowMs } from '../session/clock';
 import { RateMeter } from '../session/latency';
-import type { PictureSink, Session } from '../session/session';
+import type { PictureSink } from '../session/picture_sink';
+import type { Session } from '../session/session';
 import type { FrameFacts } from '../session/types';
 
 export interface Shown {

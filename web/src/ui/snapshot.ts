@@ -2,6 +2,7 @@ import { type Mark, strokesOf } from '../scene/strokes';
 import type { View } from '../geometry/view';
 import type { Annotation, FrameFacts } from '../session/types';
 import { withText } from '../tools/png_text';
+import type { ShownPicture } from './mark_painter';
 import { Painter } from './painter';
 
 export const KEYWORD = 'Saccade';
@@ -19,7 +20,10 @@ export interface SnapshotFacts {
 export async function takeSnapshot(
   picture: HTMLCanvasElement,
   view: View | undefined,
-  marks: readonly Mark[],
+  {
+    marks,
+    pictures,
+  }: { readonly marks: readonly Mark[]; readonly pictures: readonly ShownPicture[] },
   about: SnapshotFacts,
 ): Promise<Blob> {
   const { width, height } = picture;
@@ -32,6 +36,7 @@ export async function takeSnapshot(
   if (view) {
     const painter = new Painter(1);
     painter.begin({ width, height }, { left: 0, top: 0, scale: 1 });
+    painter.pictures(pictures);
     painter.marks(strokesOf(view, marks), []);
     context.drawImage(painter.canvas, 0, 0);
   }

@@ -1,6 +1,7 @@
 import { pageNowMs } from '../session/clock';
-import { newUuid } from '../session/edits';
+import { newUuid } from '../session/uuid';
 import { KeptSession } from '../session/kept_session';
+import { personKey } from '../session/person';
 import { Session, type SessionOptions } from '../session/session';
 import { Tabs } from '../session/tabs';
 import { Access, inviteOf } from '../transport/access';
@@ -28,7 +29,8 @@ export function startPage(
   const kept = new KeptSession(tabStorage(), options.role, !reloaded());
   const tabs = new Tabs(new BroadcastChannel('saccade'), newUuid(), openedMs(tabStorage()));
   const clients = createClients(location.origin, token);
-  const session = new Session(clients, { ...options, kept, tabs, enter }, player);
+  const own = { personKey: personKey(storage()), kept, tabs, enter };
+  const session = new Session(clients, { ...options, ...own }, player);
   player.attach(session);
   const page = makePage(session, player, token);
   document.body.append(page.element);

@@ -1,7 +1,7 @@
 import { type CommandName, COMMANDS, type Control, type ToolName, TOOLS } from '../tools/tools';
 import type { AppState } from './app_state';
 import { beside } from './beside';
-import { h, icon, setClass, setText } from './dom';
+import { h, icon, setAttribute, setClass, setText } from './dom';
 import { ICONS } from './icons';
 
 export interface ToolActions {
@@ -15,6 +15,7 @@ export class ToolsColumn {
   readonly element = h('nav', { 'aria-label': 'Tools' });
   private readonly buttons = new Map<string, HTMLButtonElement>();
   private readonly reasons = new Map<ToolName | CommandName, HTMLElement>();
+  private readonly hints = new Map<ToolName | CommandName, HTMLElement>();
   private readonly confirm: HTMLElement;
 
   constructor(private readonly actions: ToolActions) {
@@ -31,18 +32,18 @@ export class ToolsColumn {
   private add(control: Control<ToolName | CommandName>, act: () => void): void {
     const button = h(
       'button',
-      { type: 'button', 'data-control': control.name, 'aria-label': control.label },
+      {
+        ...{ type: 'button', 'data-control': control.name, 'aria-label': control.label },
+        'aria-keyshortcuts': control.shown.replace('^', 'Control+').replace('Del', 'Delete'),
+      },
       icon(ICONS[control.name]),
       h('kbd', {}, control.shown),
     );
     button.addEventListener('click', act);
     this.buttons.set(control.name, button);
-    const tip = h(
-      'span',
-      { class: 'tip', role: 'tooltip' },
-      h('b', {}, control.label),
-      control.hint,
-    );
+    const hint = h('span', {}, control.hint);
+    const tip = h('span', { class: 'tip', role: 'tooltip' }, h('b', {}, control.label), hint);
+    this.hints.set(control.name, hint);
     for (const event of ['pointerenter', 'focus'] as const) {
       button.addEventListener(event, () => beside(tip, button));
     }
@@ -65,19 +66,31 @@ export class ToolsColumn {
     );
   }
 
-  /** `on`: which of the commands that stay on are. */
-  update(state: AppState, on: Partial<Record<CommandName, boolean>>): void {
+  /** `on`: which of the commands that stay on are; `whyNot`: why one cannot be used at all. */
+  update(
+    state: AppState,
+    on: Partial<Record<CommandName, boolean>>,
+    whyNot: (name: ToolName | CommandName) => string | undefined,
+  ): void {
     for (const { name } of TOOLS) {
       const button = this.buttons.get(name);
       if (!button) continue;
       setClass(button, 'current', state.tool === name);
-      button.setAttribute('aria-pressed', String(state.tool === name));
+      setAttribute(button, 'aria-pressed', String(state.tool === name));
+    }
+    for (const { name } of [...TOOLS, ...COMMANDS]) {
+      const why = whyNot(name);
+      const button = this.buttons.get(name);
+      if (!button) continue;
+      setAttribute(button, 'aria-disabled', String(why !== undefined));
+      const hint = this.hints.get(name);
+      if (hint) setText(hint, why ?? hintOf(name));
     }
     for (const [name, isOn] of Object.entries(on)) {
       const button = this.buttons.get(name);
       if (!button) continue;
       setClass(button, 'on', isOn);
-      button.setAttribute('aria-pressed', String(isOn));
+      setAttribute(button, 'aria-pressed', String(isOn));
     }
     for (const [name, element] of this.reasons) {
       setText(element, state.refusal(name) ?? '');
@@ -94,3 +107,6 @@ export class ToolsColumn {
     if (button && words.textContent !== '') beside(words, button);
   }
 }
+
+const hintOf = (name: ToolName | CommandName): string =>
+  [...TOOLS, ...COMMANDS].find((control) => control.name === name)?.hint ?? '';

@@ -4,11 +4,12 @@ import { edgeArrowsOf } from '../scene/edge_arrows';
 import { sightInPicture } from '../scene/gaze_sight';
 import type { Session } from '../session/session';
 import { pageNowMs } from '../session/clock';
-import { type FrameFacts, isPlaced } from '../session/types';
+import { type FeatureState, type FrameFacts, isPlaced } from '../session/types';
 import type { AppState } from './app_state';
 import { Darkness } from './darkness';
 import { arrowLabel } from './gaze_words';
 import { Pane } from './pane';
+import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
 import { save, takeSnapshot } from './snapshot';
 import { Still } from './still';
@@ -21,9 +22,9 @@ export class VideoPane extends Pane {
   private still: Still | undefined;
   private readonly darkness = new Darkness();
 
-  constructor(session: Session, player: Player, state: AppState) {
+  constructor(session: Session, player: Player, state: AppState, pictures: PictureCache) {
     const words = { className: 'video', label: 'Live video', title: 'Video' };
-    super('video', words, [player.canvas], session, player, state);
+    super('video', words, [player.canvas], session, player, state, pictures);
   }
 
   get frozen(): boolean {
@@ -56,6 +57,10 @@ export class VideoPane extends Pane {
     return { facts, view: isPlaced(pose) ? makeView(camera, pose.worldFromCamera) : undefined };
   }
 
+  view(): View | undefined {
+    return this.current()?.view;
+  }
+
   /** Keeps the picture on the screen with its marks as a file. */
   async snapshot(takenBy: string): Promise<void> {
     const current = this.current();
@@ -63,10 +68,16 @@ export class VideoPane extends Pane {
     const { session, state, player, still } = this;
     const marks = this.sameMap ? this.marks() : [];
     const annotations = session.annotations.list().filter((each) => state.draws(each));
-    const blob = await takeSnapshot(still?.canvas ?? player.canvas, current.view, marks, {
-      ...{ facts: current.facts, source: session.joined?.source ?? '', takenBy },
-      ...{ metric: session.scale.metric, annotations },
-    });
+    const pictures = current.view ? this.shownPictures(current.view, marks) : [];
+    const blob = await takeSnapshot(
+      still?.canvas ?? player.canvas,
+      current.view,
+      { marks, pictures },
+      {
+        ...{ facts: current.facts, source: session.joined?.source ?? '', takenBy },
+        ...{ metric: session.scale.metric, annotations },
+      },
+    );
     save(blob, `saccade-${current.facts.frameId}.png`);
   }
 
@@ -86,13 +97,13 @@ export class VideoPane extends Pane {
   }
 
   private layout(): { left: number; top: number; scale: number; width: number; height: number } {
-    const { clientWidth, clientHeight } = this.element;
+    const { width: paneWidth, height: paneHeight } = this.size;
     const width = Math.max(this.player.canvas.width, 1);
     const height = Math.max(this.player.canvas.height, 1);
-    const scale = Math.min(clientWidth / width, clientHeight / height);
+    const scale = Math.min(paneWidth / width, paneHeight / height);
     return {
-      left: (clientWidth - width * scale) / 2,
-      top: (clientHeight - height * scale) / 2,
+      left: (paneWidth - width * scale) / 2,
+      top: (paneHeight - height * scale) / 2,
       scale,
       width,
       height,
@@ -102,17 +113,23 @@ export class VideoPane extends Pane {
   draw(): void {
     if (this.still && !this.still.valid) this.thaw();
     const layout = this.layout();
-    const transform = `translate(${layout.left}px, ${layout.top}px) scale(${layout.scale})`;
-    this.player.canvas.style.transform = transform;
-    if (this.still) this.still.canvas.style.transform = transform;
-    const { clientWidth, clientHeight } = this.element;
-    this.painter.begin({ width: clientWidth, height: clientHeight }, layout);
+    this.place(layout);
+    const begin = performance.now();
+    this.painter.begin(this.size, layout);
     this.painter.clip(layout.width, layout.height);
     const current = this.current();
     if (current?.view) this.drawFrame(current.facts, current.view);
     this.painter.end();
+    this.took(performance.now() - begin);
     this.painter.canvas.dataset['frameId'] = current ? String(current.facts.frameId) : '';
     this.updateNote();
+  }
+
+  private place({ left, top, scale }: { left: number; top: number; scale: number }): void {
+    const transform = `translate(${left}px, ${top}px) scale(${scale})`;
+    for (const canvas of [this.player.canvas, this.still?.canvas]) {
+      if (canvas && canvas.style.transform !== transform) canvas.style.transform = transform;
+    }
   }
 
   private drawFrame(facts: FrameFacts, view: View): void {
@@ -145,15 +162,19 @@ export class VideoPane extends Pane {
   private drawFeatures(facts: FrameFacts, view: View): void {
     const { map } = this.session;
     const sameMap = this.still !== undefined || facts.pose?.mapRevision === map.revision;
+    const places: Record<FeatureState, Pixel[]> = { not_attempted: [], failed: [], measured: [] };
     for (const { id, pointInWorld } of sameMap
       ? (this.still?.features ?? map.features.values())
       : []) {
       if (facts.features?.has(id)) continue;
       const at = projectPoint(view, pointInWorld);
-      if (at && facts.camera.inImage(at)) this.painter.feature(at, 'not_attempted');
+      if (at && facts.camera.inImage(at)) places.not_attempted.push(at);
     }
     for (const { state, pixel } of facts.features?.values() ?? []) {
-      if (facts.camera.inImage(pixel)) this.painter.feature(pixel, state);
+      if (facts.camera.inImage(pixel)) places[state].push(pixel);
+    }
+    for (const state of ['not_attempted', 'failed', 'measured'] as const) {
+      this.painter.features(state, places[state]);
     }
   }
 

@@ -8,7 +8,7 @@ import { strokesOf } from '../scene/strokes';
 import { pageNowMs } from '../session/clock';
 import { toIntrinsics, toPose } from '../session/convert';
 import { RateMeter } from '../session/latency';
-import { newUuid } from '../session/edits';
+import { newUuid } from '../session/uuid';
 import type { Session } from '../session/session';
 import { isPlaced, type Pose } from '../session/types';
 import { CameraStream } from '../uplink/camera';

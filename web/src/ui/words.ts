@@ -128,7 +128,8 @@ export const counted = (count: number, thing: string): string =>
   `${count} ${thing}${count === 1 ? '' : 's'}`;
 
 /** What a person calls a mark of this shape. */
-export const shapeWord = (shape: Shape): string => (shape === 'ink' ? 'stroke' : shape);
+export const shapeWord = (shape: Shape): string =>
+  shape === 'ink' ? 'stroke' : shape.replace('_', ' ');
 
 /** "2 experts, 1 wearer". */
 export function presenceWords(participants: readonly { readonly role: string }[]): string {

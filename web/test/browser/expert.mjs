@@ -35,7 +35,7 @@ function withoutPriority(executablePath, folder, prefix) {
 export class Expert {
   /**
    * `home`: whose certificates count; `prefix`: a command that runs the browser elsewhere; `flags`: more of
-   * the browser's; `viewport`: of the page.
+   * the browser's; `viewport`: of the page; `nameless`: who sits there is asked for a name.
    */
   static async open(
     executablePath,
@@ -45,6 +45,7 @@ export class Expert {
       prefix = [],
       flags = [],
       viewport = { width: 1280, height: 720 },
+      nameless = false,
     } = {},
   ) {
     const profile = mkdtempSync(join(tmpdir(), 'saccade-browser-'));
@@ -57,7 +58,9 @@ export class Expert {
     const page = context.pages()[0] ?? (await context.newPage());
     const expert = new Expert(context, page, profile);
     page.on('pageerror', (error) => expert.errors.push(error.message));
-    await page.goto(url);
+    const address = new URL(url);
+    if (!nameless && !address.searchParams.has('name')) address.searchParams.set('name', 'expert');
+    await page.goto(address.href);
     return expert;
   }
 

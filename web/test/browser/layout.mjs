@@ -1,8 +1,7 @@
 // Every size of window from a small phone to a wide desk, light and dark, by finger and by mouse: nothing
 // is cut off, nothing overlaps, the picture keeps its share, and axe-core finds no barrier (WCAG 2.2 AA).
-import { createRequire } from 'node:module';
-import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { barriers } from './axe.mjs';
 import { Expert } from './expert.mjs';
 import { startServer } from './server.mjs';
 
@@ -15,9 +14,7 @@ const SIZES = [
   { name: 'desk', width: 1920, height: 1080, touch: false },
   { name: 'wide', width: 3440, height: 1440, touch: false },
 ];
-const RULES = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'];
 const FINGER_PX = 44;
-const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
 export async function runLayout({ server: binary, chromium, seed, shots, folder }) {
   const server = await startServer(binary, [
@@ -121,22 +118,6 @@ async function wearer(context, url) {
     context.check(`wearer ${width} x ${height}, axe`, await barriers(page));
     if (shots) await page.screenshot({ path: join(shots, `layout-wearer-${width}.png`) });
   }
-}
-
-/** What axe-core holds against the page, and where. */
-async function barriers(page) {
-  const violations = await page.evaluate(
-    async ([source, values]) => {
-      if (!window.axe) new Function(source)();
-      const found = await window.axe.run(document, { runOnly: { type: 'tag', values } });
-      return found.violations.map(({ id, nodes }) => [
-        id,
-        nodes.map(({ target }) => target.join(' ')),
-      ]);
-    },
-    [axe, RULES],
-  );
-  return violations.map(([id, where]) => `${id} at ${where.slice(0, 3).join(', ')}`);
 }
 
 /** What is cut off, covered, too small for a finger, or takes too much of the picture. */

@@ -1,10 +1,10 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze|dots|person|invite|layout|wear|waiting]   (gaze: the turning of the head; dots: measured features
+//        [--part page|gaze|dots|person|tools|invite|layout|wear|waiting]   (gaze: the turning of the head; dots: measured features
 //        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
 //        from another address than loopback where this may make a network namespace; wear: a phone as the
 //        camera, and an expert, each in a network of its own; layout: sizes of
-//        window and barriers; waiting: who comes waits to be let in; page: everything else)
+//        window and barriers; tools: two people and what they draw, point at and change; waiting: who comes waits to be let in; page: everything else)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -42,6 +42,7 @@ const PARTS = {
   gaze: async () => (await import('./gaze.mjs')).runGaze,
   dots: async () => (await import('./dots.mjs')).runDots,
   person: async () => (await import('./person.mjs')).runPerson,
+  tools: async () => (await import('./tools.mjs')).runTools,
   invite: async () => (await import('./invite.mjs')).runInvite,
   layout: async () => (await import('./layout.mjs')).runLayout,
   wear: async () => (await import('./wear.mjs')).runWear,

@@ -341,7 +341,8 @@ describe('words of the gaze', () => {
     const ann = { participantId: 'a', displayName: 'Ann' };
     const bob = { participantId: 'b', displayName: 'Bob' };
     const gaze = gazeOf({ pilot: ann, queue: [bob], lastHandover: 'Bob released; Ann pilots' });
-    const participants = [{ participantId: 'a', name: 'Ann', role: 'wearer' }] as const;
+    const person = { personId: '', colorRgba: 0 };
+    const participants = [{ ...person, participantId: 'a', name: 'Ann', role: 'wearer' }] as const;
     const lease = { kind: 'none' } as const;
     const say = (me: string, present: readonly (typeof participants)[number][] = []) =>
       steerWords({ gaze, lease, me, participants: present });

@@ -8,6 +8,7 @@ import { makeView } from '../../src/geometry/view';
 import { edgeArrowsOf } from '../../src/scene/edge_arrows';
 import { axisStrokes, markOf, strokesOf } from '../../src/scene/strokes';
 import type { AnchorState, Annotation, Shape } from '../../src/session/types';
+import { PLAIN } from './annotations';
 
 type Pair = [number, number];
 type Triple = [number, number, number];
@@ -29,6 +30,13 @@ interface Golden {
     error_px?: number;
     point_in_world_m: Triple;
     ink_offset_m: Triple[];
+    world_from_mark?: [number, number, number, number];
+    extent_m?: Triple;
+    number?: number;
+    length_m?: number;
+    length_sigma_m?: number;
+    picture?: { width: number; height: number };
+    check_items?: { text: string; done: boolean }[];
   }[];
   views: {
     camera: Intrinsics;
@@ -52,7 +60,16 @@ const drawn = (mark: { annotationId: string; hollow: boolean; colour: string }):
 });
 
 const marks = golden.annotations.map((entry) => {
+  const [x = 0, y = 0, z = 0, w = 1] = entry.world_from_mark ?? [];
   const annotation: Annotation = {
+    ...PLAIN,
+    worldFromMark: entry.world_from_mark && { x, y, z, w },
+    extentM: entry.extent_m && vec3(entry.extent_m),
+    number: entry.number ?? 0,
+    lengthM: entry.length_m ?? 0,
+    lengthSigmaM: entry.length_sigma_m ?? 0,
+    picture: entry.picture && { ...entry.picture, sha256: '' },
+    checkItems: (entry.check_items ?? []).map((item) => ({ ...item, doneBy: '' })),
     id: entry.id,
     shape: entry.shape,
     text: entry.text,

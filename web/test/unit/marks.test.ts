@@ -5,21 +5,38 @@ import type { Pose } from '../../src/session/types';
 import { NO_FILTER, passes } from '../../src/tools/mark_filter';
 import { withText } from '../../src/tools/png_text';
 import { controlOf } from '../../src/tools/tools';
+import { PLAIN } from './annotations';
 
-const mark = { text: 'Größe prüfen', author: 'Ann', shape: 'note' } as const;
+const mark = { ...PLAIN, text: 'Größe prüfen', author: 'Ann', shape: 'note' } as const;
+const me = (name: string, personId = '') => ({ name, personId });
 
 describe('finding marks', () => {
   it('asks for every word, in text, shape or author, whatever case and accents', () => {
-    expect(passes(mark, NO_FILTER, 'Bo')).toBe(true);
-    expect(passes(mark, { text: 'GROSSE', mine: false }, '')).toBe(false); // ß is not ss
-    expect(passes(mark, { text: 'große PRUFEN', mine: false }, '')).toBe(true);
-    expect(passes(mark, { text: ' ann  note ', mine: false }, '')).toBe(true);
-    expect(passes(mark, { text: 'ann cube', mine: false }, '')).toBe(false);
+    expect(passes(mark, NO_FILTER, me('Bo'))).toBe(true);
+    expect(passes(mark, { text: 'GROSSE', mine: false }, me(''))).toBe(false); // ß is not ss
+    expect(passes(mark, { text: 'große PRUFEN', mine: false }, me(''))).toBe(true);
+    expect(passes(mark, { text: ' ann  note ', mine: false }, me(''))).toBe(true);
+    expect(passes(mark, { text: 'ann cube', mine: false }, me(''))).toBe(false);
   });
 
   it('shows only mine where asked to', () => {
-    expect(passes(mark, { text: '', mine: true }, 'Ann')).toBe(true);
-    expect(passes(mark, { text: '', mine: true }, 'Bo')).toBe(false);
+    expect(passes(mark, { text: '', mine: true }, me('Ann'))).toBe(true);
+    expect(passes(mark, { text: '', mine: true }, me('Bo'))).toBe(false);
+  });
+
+  it('knows what is mine by the person, whatever the name', () => {
+    const mine = { text: '', mine: true };
+    const made = { ...mark, authorPersonId: 'p' };
+    expect(passes(made, mine, me('Annette', 'p'))).toBe(true);
+    expect(passes(made, mine, me('Ann', 'q'))).toBe(false);
+  });
+
+  it('finds a check list by its lines and a pin by its number', () => {
+    const items = [{ text: 'close valve', done: false, doneBy: '' }];
+    const list = { ...mark, shape: 'check_list', checkItems: items } as const;
+    expect(passes(list, { text: 'valve check', mine: false }, me(''))).toBe(true);
+    const pin = { ...mark, shape: 'pin', number: 12 } as const;
+    expect(passes(pin, { text: 'pin 12', mine: false }, me(''))).toBe(true);
   });
 
   it('has a key each', () => {

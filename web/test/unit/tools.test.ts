@@ -3,13 +3,15 @@ import { Camera } from '../../src/geometry/camera';
 import { IDENTITY } from '../../src/geometry/rigid3';
 import { distance, type Vec3 } from '../../src/geometry/vec3';
 import { makeView, projectPoint } from '../../src/geometry/view';
-import { cubeEdges, markOf, strokesOf } from '../../src/scene/strokes';
+import { linesOf } from '../../src/scene/shapes';
+import { markOf, strokesOf } from '../../src/scene/strokes';
 import { readsRightToLeft, wrap } from '../../src/scene/wrap';
 import type { Annotation, Feature } from '../../src/session/types';
 import { bytesOf, cleanText, roomWords } from '../../src/tools/note_text';
 import { landingInMap, landingInVideo, landingWords, ringRadius } from '../../src/tools/landing';
 import { pickNearest } from '../../src/tools/pick';
 import { COMMANDS, controlOf, HEAD_COMMANDS, TOOLS } from '../../src/tools/tools';
+import { PLAIN } from './annotations';
 import { anchorWords, crowdedWords, dated, presenceWords, statusWords } from '../../src/ui/words';
 
 const METRIC = { metric: true, eye: IDENTITY.translation };
@@ -102,6 +104,7 @@ describe('pickNearest', () => {
 });
 
 const annotation: Annotation = {
+  ...PLAIN,
   id: 'a',
   shape: 'cube',
   text: '',
@@ -130,9 +133,9 @@ const paused: Annotation = {
 
 describe('strokes', () => {
   it('draws a cube of 12 edges about its anchor', () => {
-    const edges = cubeEdges({ x: 1, y: 2, z: 3 }, 0.05);
+    const edges = linesOf(markOf(annotation, METRIC)!, view);
     expect(edges).toHaveLength(12);
-    for (const [a, b] of edges) expect(distance(a, b)).toBeCloseTo(0.05, 12);
+    for (const [a, b] of edges) expect(distance(a!, b!)).toBeCloseTo(0.05, 12);
     const { strokes } = strokesOf(view, [markOf(annotation, METRIC)!]);
     const points = strokes.flatMap((stroke) => stroke.points);
     const mean = points.reduce((sum, p) => sum + p.u, 0) / points.length;

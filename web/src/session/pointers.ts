@@ -1,0 +1,63 @@
+import { type PointerEvent, PointerKind } from '../gen/saccade/v1/pointer_pb';
+import type { Vec3 } from '../geometry/vec3';
+import { toVec3 } from './convert';
+
+/** What somebody else points at or draws right now. */
+export interface OthersPointer {
+  readonly strokeId: string;
+  readonly kind: 'laser' | 'sketch';
+  readonly name: string;
+  readonly colorRgba: number;
+  /** In world [m]; of a laser its newest point alone. */
+  readonly points: readonly Vec3[];
+  readonly heardMs: number;
+}
+
+/** Without a word for so long it is gone, whatever became of its end. */
+const SILENT_MS = 1500;
+
+export class PointerBook {
+  private readonly known = new Map<string, OthersPointer>();
+  /** Rises with every change. */
+  version = 0;
+
+  /** `me`: the participant whose own are not kept, as they are drawn before they are sent. */
+  apply({ pointers }: PointerEvent, me: string, nowMs: number): void {
+    for (const pb of pointers) {
+      if (pb.participantId === me) continue;
+      const key = `${pb.participantId} ${pb.kind}`;
+      const before = this.known.get(key);
+      ++this.version;
+      if (pb.released) {
+        if (before?.strokeId === pb.strokeId) this.known.delete(key);
+        continue;
+      }
+      const news = pb.pointsInWorldM.map(toVec3);
+      const laser = pb.kind === PointerKind.LASER;
+      const old = before?.strokeId === pb.strokeId ? before.points : [];
+      const newest = news.at(-1) ?? old.at(-1);
+      this.known.set(key, {
+        strokeId: pb.strokeId,
+        kind: laser ? 'laser' : 'sketch',
+        name: pb.displayName,
+        colorRgba: pb.colorRgba || 0xffffffff,
+        points: laser ? (newest ? [newest] : []) : [...old.slice(0, pb.first), ...news],
+        heardMs: nowMs,
+      });
+    }
+  }
+
+  list(nowMs: number): OthersPointer[] {
+    for (const [key, { heardMs }] of this.known) {
+      if (nowMs - heardMs < SILENT_MS) continue;
+      this.known.delete(key);
+      ++this.version;
+    }
+    return [...this.known.values()];
+  }
+
+  clear(): void {
+    this.known.clear();
+    ++this.version;
+  }
+}
