@@ -41,6 +41,9 @@ enum class Command {
   kAudit,
   kWaiting,
   kAdmit,
+  kSay,
+  kMessages,
+  kPausePicture,
   kCameras,  // of this machine; asks no server
   kRecord,   // likewise
   kCalibrateCamera,
@@ -54,7 +57,7 @@ struct Options {
   std::string out;                             // map, snapshot, calibrate-mount: file to write
   net::VideoView view = net::VideoView::kRaw;  // snapshot
   std::optional<FrameId> frame;                // snapshot, annotate --pixel; nothing: the newest
-  std::string id;                              // show, delete: UUID or the beginning of one
+  std::string id;                              // show, delete, say: UUID or the beginning of one
   double watch_s = 0;                          // watch: end after this time; 0: never
   AnnotationDraft draft;                       // annotate; frame_id 0 until `frame` is known
   GazeTarget gaze;                             // fixate
@@ -72,6 +75,9 @@ struct Options {
   std::uint32_t uses = 1;     // invite
   bool waiting_room = false;  // invite: who comes by it waits
   bool refuse = false;        // admit: sends them away instead
+  std::string text;           // say
+  bool follow = false;        // messages
+  bool pause = false;         // pause-picture
   double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
   struct Record {
     std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them

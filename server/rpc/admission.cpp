@@ -9,8 +9,9 @@
 namespace saccade {
 namespace {
 
-constexpr const char* kWhat[kTolls] = {"joins",  "streams opened", "edits",     "resets of the map",
-                                       "stills", "gaze commands",  "questions", "invites redeemed"};
+constexpr const char* kWhat[kTolls] = {
+    "joins",     "streams opened",   "edits",    "resets of the map", "stills", "gaze commands",
+    "questions", "invites redeemed", "messages", "packets of voice"};
 
 absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const char* whose) {
   if (!wait_ns) return absl::OkStatus();
@@ -20,20 +21,22 @@ absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const cha
 }  // namespace
 
 const RpcLimits::Kind& RpcLimits::of(Toll toll) const {
-  const Kind* const kinds[kTolls] = {&join,  &subscribe, &edit, &reset,
-                                     &still, &gaze,      &read, &redeem};
+  const Kind* const kinds[kTolls] = {&join, &subscribe, &edit,   &reset, &still,
+                                     &gaze, &read,      &redeem, &say,   &speak};
   return *kinds[static_cast<int>(toll)];
 }
 
 RpcLimits RpcLimits::Scaled(double factor) const {
   RpcLimits scaled = *this;
   for (Kind* kind : {&scaled.join, &scaled.subscribe, &scaled.edit, &scaled.reset, &scaled.still,
-                     &scaled.gaze, &scaled.read, &scaled.redeem}) {
+                     &scaled.gaze, &scaled.read, &scaled.redeem, &scaled.say, &scaled.speak}) {
     for (RateLimit* limit : {&kind->courtesy, &kind->session, &kind->peer, &kind->server}) {
       limit->per_s *= factor;
       limit->burst = std::max(1.0, limit->burst * factor);
     }
   }
+  scaled.voice_packets.per_s *= factor;
+  scaled.voice_packets.burst = std::max(1.0, scaled.voice_packets.burst * factor);
   return scaled;
 }
 

@@ -11,8 +11,8 @@
 namespace saccade {
 
 /// Kinds of calls, by what they cost.
-enum class Toll { kJoin, kSubscribe, kEdit, kReset, kStill, kGaze, kRead, kRedeem };
-inline constexpr int kTolls = 8;
+enum class Toll { kJoin, kSubscribe, kEdit, kReset, kStill, kGaze, kRead, kRedeem, kSay, kSpeak };
+inline constexpr int kTolls = 10;
 
 /// How often each kind may be called by one session, by one address, and by all together.
 ///
@@ -33,6 +33,11 @@ struct RpcLimits {
   Kind gaze{{10, 20}, {60, 120}, {400, 800}, {}};    // heartbeats: 7 to 20 a second
   Kind read{{}, {}, {100, 500}, {}};                 // up to a megabyte each
   Kind redeem{{}, {}, {1, 20}, {}};  // of invites, by strangers: nobody else's joins pay for them
+
+  Kind say{{}, {1, 10}, {10, 60}, {20, 100}};         // told to everybody
+  Kind speak{{60, 120}, {60, 240}, {600, 2400}, {}};  // a batch each 20 ms
+  /// Packets of one speaker, beside what `speak` says of calls: 50 a second are spoken.
+  RateLimit voice_packets{75, 150};
 
   const Kind& of(Toll toll) const;
   /// Every rate and burst times `factor`; 0: no limits, for laboratories.

@@ -14,6 +14,7 @@
 #include "server/rpc/live_pem.hpp"
 #include "server/rpc/map_service.hpp"
 #include "server/rpc/session_service.hpp"
+#include "server/rpc/talk_service.hpp"
 
 namespace saccade {
 namespace {
@@ -88,7 +89,8 @@ class RpcServer::Impl {
         session_service_(backend, hub, gate_),
         annotation_service_(backend, gate_),
         map_service_(backend, hub, gate_),
-        gaze_service_(backend, gate_) {
+        gaze_service_(backend, gate_),
+        talk_service_(backend, hub, gate_, options.limits.voice_packets) {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
       hub_.End(ids, why);
@@ -133,6 +135,7 @@ class RpcServer::Impl {
     builder.RegisterService(&annotation_service_);
     builder.RegisterService(&map_service_);
     builder.RegisterService(&gaze_service_);
+    builder.RegisterService(&talk_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
     listener_ = *std::move(listener);
@@ -174,6 +177,7 @@ class RpcServer::Impl {
   AnnotationService annotation_service_;
   MapService map_service_;
   GazeService gaze_service_;
+  TalkService talk_service_;
   std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
   std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs
   std::unique_ptr<grpc::Server> server_;
