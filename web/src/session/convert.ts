@@ -79,7 +79,7 @@ const anchorStates: Record<PbAnchorState, AnchorState> = {
   [PbAnchorState.STOPPED]: 'stopped',
 };
 
-const shapes: Record<AnnotationShape, Shape> = {
+const shapes: Partial<Record<AnnotationShape, Shape>> = {
   [AnnotationShape.UNSPECIFIED]: 'cube',
   [AnnotationShape.CUBE]: 'cube',
   [AnnotationShape.NOTE]: 'note',
@@ -201,7 +201,7 @@ export const toAnchor = (pb: PbAnchor | undefined): Anchor => ({
 export function toAnnotation(pb: PbAnnotation): Annotation {
   return {
     id: pb.id,
-    shape: shapes[pb.shape],
+    shape: shapes[pb.shape] ?? 'cube',
     text: pb.text,
     author: pb.author,
     sizeM: pb.sizeM > 0 ? pb.sizeM : 0.05,
@@ -216,6 +216,7 @@ export const toParticipant = (pb: PbParticipant): Participant => ({
   participantId: pb.participantId,
   name: pb.displayName,
   role: roles[pb.role],
+  listens: pb.listens,
 });
 
 export const toStatistics = (pb: StatisticsEvent): Statistics => ({

@@ -14,21 +14,14 @@ import { toGaze } from './gaze_convert';
 import { Joining } from './joining';
 import type { KeptSession } from './kept_session';
 import { MapState } from './map_state';
+import { follow } from './path';
+import type { PictureSink } from './picture_sink';
 import { FrameRing } from './ring';
 import { silenceWords } from './silence';
 import { sleep } from './sleep';
 import type { Tabs } from './tabs';
-import { isPlaced } from './types';
+import { TalkState } from './talk_state';
 import type { FrameFacts, Link, Participant, Pose, Role, Scale, Statistics, View } from './types';
-
-/** Where coded pictures go. */
-export interface PictureSink {
-  decode(facts: FrameFacts, unit: AccessUnit): void;
-  /** A new subscription begins: the next unit is a key frame. */
-  reset(): void;
-  /** True while so much waits to be decoded that no more should come. */
-  readonly behind: boolean;
-}
 
 export interface SessionOptions {
   readonly role: Role;
@@ -65,6 +58,7 @@ export class Session {
   readonly frames = new FrameRing<FrameFacts>(300);
   readonly path: Pose[] = [];
   readonly clock = new ClockOffset();
+  readonly talk = new TalkState();
   private readonly reader = new FrameReader();
   private heardMs = 0; // when the stream last told something; 0: not yet
   private lastEventMs = 0;
@@ -117,6 +111,14 @@ export class Session {
   rename(name: string): void {
     if (name === this.joining.name) return;
     this.joining.rename(name);
+    this.renamed = true;
+    this.attempt?.abort();
+  }
+
+  /** Whether this page hears voices: subscribes anew, in the same session. */
+  listen(listens: boolean): void {
+    if (this.talk.listens === listens) return;
+    this.talk.listens = listens;
     this.renamed = true;
     this.attempt?.abort();
   }
@@ -195,11 +197,12 @@ export class Session {
     ];
     try {
       void this.ping(signal);
+      void this.talk.catchUp(this.clients.talk, joined.sessionId, signal);
       const stream = this.clients.session.subscribe(
         {
           sessionId: joined.sessionId,
           window: WINDOW,
-          topics,
+          topics: this.talk.topics(topics),
           videoView: view === 'raw' ? VideoView.RAW : VideoView.AUGMENTED,
         },
         { signal },
@@ -275,8 +278,8 @@ export class Session {
       case 'gaze':
         this.gaze = toGaze(event.value);
         break;
-      case undefined:
-        break;
+      default:
+        this.talk.receive(event);
     }
     this.acknowledger?.arrived(sequence);
   }
@@ -289,11 +292,8 @@ export class Session {
   }
 
   private receivePose(pose: Pose): void {
-    if (this.pose && pose.mapRevision !== this.pose.mapRevision) this.path.length = 0;
+    follow(this.path, this.pose, pose);
     this.pose = pose;
     this.poseMs = this.lastEventMs;
-    if (!isPlaced(pose)) return;
-    this.path.push(pose);
-    if (this.path.length > 9000) this.path.splice(0, 3000);
   }
 }

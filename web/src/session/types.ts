@@ -109,6 +109,8 @@ export interface Participant {
   readonly participantId: string;
   readonly name: string;
   readonly role: Role;
+  /** Has joined the voices. */
+  readonly listens?: boolean;
 }
 
 /** The server's, over the last seconds. */

@@ -5,12 +5,14 @@ import { AnnotationService } from '../gen/saccade/v1/annotation_pb';
 import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
+import { TalkService } from '../gen/saccade/v1/talk_pb';
 
 export interface Clients {
   readonly session: Client<typeof SessionService>;
   readonly annotations: Client<typeof AnnotationService>;
   readonly map: Client<typeof MapService>;
   readonly gaze: Client<typeof GazeService>;
+  readonly talk: Client<typeof TalkService>;
 }
 
 /** gRPC-Web to the server that this page came from; `token` goes with each call, if there is one. */
@@ -22,5 +24,6 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
     annotations: createClient(AnnotationService, transport),
     map: createClient(MapService, transport),
     gaze: createClient(GazeService, transport),
+    talk: createClient(TalkService, transport),
   };
 }

@@ -55,7 +55,7 @@ export class Controller implements ToolActions, AnnotationActions {
         break;
       case 'freeze':
         if (this.video.frozen) this.video.thaw();
-        else if (!this.video.freeze()) state.refuse('freeze', 'There is no picture yet.');
+        else if (!this.video.freeze()) state.refuse('freeze', this.video.whyNoPicture);
         state.hover = undefined;
         break;
       case 'swap':

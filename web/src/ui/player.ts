@@ -2,7 +2,8 @@ import type { AccessUnit } from '../gen/saccade/v1/video_pb';
 import { Decoder } from '../decode/decoder';
 import { pageNowMs } from '../session/clock';
 import { RateMeter } from '../session/latency';
-import type { PictureSink, Session } from '../session/session';
+import type { PictureSink } from '../session/picture_sink';
+import type { Session } from '../session/session';
 import type { FrameFacts } from '../session/types';
 
 export interface Shown {
@@ -59,6 +60,10 @@ export class Player implements PictureSink {
   /** Draws the newest picture; true if there was a new one. */
   draw(): boolean {
     const { next, context } = this;
+    if (this.session?.talk.pause) {
+      this.clear();
+      return false;
+    }
     if (!next || !context) return false;
     this.next = undefined;
     const facts = this.session?.frames.get(next.frame.timestamp);
@@ -76,5 +81,16 @@ export class Player implements PictureSink {
     this.canvas.dataset['frameId'] = String(facts.frameId);
     this.rate.add(drawnMs);
     return true;
+  }
+
+  /** Nothing of what was shown stays on the canvas. */
+  private clear(): void {
+    const { next, shown, canvas } = this;
+    next?.frame.close();
+    this.next = undefined;
+    if (!shown) return;
+    this.shown = undefined;
+    this.context?.clearRect(0, 0, canvas.width, canvas.height);
+    canvas.dataset['frameId'] = '';
   }
 }

@@ -124,7 +124,7 @@ async function wearer(context, url) {
 }
 
 /** What axe-core holds against the page, and where. */
-async function barriers(page) {
+export async function barriers(page) {
   const violations = await page.evaluate(
     async ([source, values]) => {
       if (!window.axe) new Function(source)();
