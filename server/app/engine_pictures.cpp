@@ -15,6 +15,7 @@ void Engine::PausePicture(bool paused, std::string by, Done<PicturePause> done) 
 std::shared_ptr<const PicturePause> Engine::picture_pause() const { return pictures_->state(); }
 
 void Engine::OnPicturePause(const std::shared_ptr<const PicturePause>& state) {
+  for (const auto& view : views_) view->AwaitFrame();
   sink_.OnPicturePause(state);
   if (state->paused) return;
   for (const auto& view : views_) view->RequestKeyFrame();

@@ -69,6 +69,11 @@ void ViewEncoder::RequestKeyFrame() {
   PostAgain();
 }
 
+void ViewEncoder::AwaitFrame() {
+  const std::lock_guard lock(mutex_);
+  posted_ns_ = MonotonicNow();
+}
+
 void ViewEncoder::PostAgain() {
   std::optional<TrackedFrame> again;
   {

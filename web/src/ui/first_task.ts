@@ -33,11 +33,11 @@ export class FirstTask {
     this.steps = [
       {
         words:
-          'Place a note on the mug: press N, click the mug in the video or the map, write what it is, and press Enter.',
+          'Place a note on the mug: choose Note (N), click the mug in the video or the map, write what it is, and press Enter.',
         done: () => this.mine().some((id) => !this.notes.has(id)),
       },
       {
-        words: 'Freeze the picture: press P. It stands still; the map goes on.',
+        words: 'Freeze the picture (P). It stands still; the map goes on.',
         done: () => this.video.frozen,
       },
       {

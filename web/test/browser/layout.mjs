@@ -17,6 +17,7 @@ const SIZES = [
 ];
 const RULES = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'];
 const FINGER_PX = 44;
+const PANELS = { marks: 'aside', gaze: 'section.gaze', talk: 'section.talk' };
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
 export async function runLayout({ server: binary, chromium, seed, shots, folder }) {
@@ -72,9 +73,9 @@ async function atSize(context, size) {
   context.check(`${name} ${width} x ${height}, words and tools`, await faults(page, size));
   context.check(`${name}, axe`, await barriers(page));
   if (shots) await page.screenshot({ path: join(shots, `layout-${name}.png`) });
-  for (const sheet of ['marks', 'gaze']) {
+  for (const [sheet, where] of Object.entries(PANELS)) {
     const button = page.locator(`button[data-sheet="${sheet}"]`);
-    const panel = page.locator(sheet === 'marks' ? 'aside' : 'section.gaze');
+    const panel = page.locator(where);
     if (!(await button.isVisible())) {
       context.check(
         `${name}, ${sheet} beside the picture`,

@@ -162,11 +162,16 @@ const heardAt = async ({ page }, selector) => {
 
 async function voices(context) {
   const { ann, wim, check } = context;
+  await ann.page.locator('.talk-head').click();
   await ann.press('8');
   await wim.press('v');
   await wim.page.getByRole('button', { name: 'Mute' }).waitFor({ timeout: 15_000 });
-  await ann.page.locator('.talk-head').click();
-  await ann.page.getByRole('button', { name: 'Mute' }).waitFor({ timeout: 15_000 });
+  await ann.page
+    .locator('.voice button[aria-keyshortcuts="7"]:not(.hidden)')
+    .waitFor({ timeout: 15_000 });
+  // Two software GPUs on the cores that carry the voices as well: little is drawn meanwhile.
+  await ann.page.setViewportSize({ width: 620, height: 420 });
+  await wim.page.setViewportSize({ width: 400, height: 300 });
   await sleep(6000); // the microphones and the buffers settle
   const selectors = { ann: '.voice', wim: '.wearer-view' };
   let before = await heardAt(wim, selectors.wim);
@@ -190,7 +195,6 @@ async function voices(context) {
     seen = await ann.page.locator('.people .speaks').count();
   }
   check('the name of who speaks is lit', seen > 0, `${seen} lit`);
-  await shot(context, ann, 'expert');
   await wim.page.evaluate((loss) => {
     document.documentElement.dataset.voiceLoss = String(loss);
   }, LOSS);
@@ -209,12 +213,21 @@ async function voices(context) {
     `delay p50 ${quantile(took, 0.5).toFixed(0)} ms, p95 ${quantile(took, 0.95).toFixed(0)} ms, ${took.length} of ${lossy.spoken.length} heard; ${concealed} of ${played + concealed} frames concealed (${(100 * share).toFixed(1)} %)`,
   );
   await mutes(context);
+  await ann.page.setViewportSize({ width: 1280, height: 720 });
+  await wim.page.setViewportSize({ width: 960, height: 720 });
 }
+
+/** The button may be folded away in a small window. */
+const pushToTalk = ({ page }) =>
+  page.evaluate(() => {
+    const buttons = [...document.querySelectorAll('.voice button')];
+    buttons.find(({ textContent }) => textContent === 'Push to talk').click();
+  });
 
 /** Muted, and with push to talk, nothing is heard; held, it is. */
 async function mutes({ ann, wim, check }) {
   const heard = async (seconds) => {
-    await sleep(700); // what is on its way
+    await sleep(2000); // what is on its way
     const before = (await heardAt(wim, '.wearer-view')).played;
     await sleep(1000 * seconds);
     return (await heardAt(wim, '.wearer-view')).played - before;
@@ -222,12 +235,12 @@ async function mutes({ ann, wim, check }) {
   await ann.press('7');
   const muted = await heard(2);
   await ann.press('7');
-  await ann.page.getByRole('button', { name: 'Push to talk' }).click();
+  await pushToTalk(ann);
   const silent = await heard(2);
   await ann.page.keyboard.down(' ');
   const held = await heard(3);
   await ann.page.keyboard.up(' ');
-  await ann.page.getByRole('button', { name: 'Push to talk' }).click();
+  await pushToTalk(ann);
   check(
     'muted nothing is heard, nor with push to talk until Space is held',
     muted === 0 && silent === 0 && held > 30,
@@ -242,7 +255,8 @@ async function messages(context) {
   await page.locator('aside .pick').first().click();
   await ann.press('9');
   await page.keyboard.type('this one, please');
-  await page.locator('.say .chip').click();
+  await page.locator('.say .chip').focus();
+  await page.keyboard.press('Enter');
   await page.locator('.say input').press('Enter');
   const news = wim.page.locator('.news', { hasText: 'Ann: this one, please' });
   await news.waitFor({ timeout: 5000 });
