@@ -24,12 +24,12 @@ export class TalkPanel {
   private readonly count = h('span', { class: 'number' });
   private readonly latest = h('span', { class: 'latest', dir: 'auto' });
   private readonly body: HTMLElement;
-  private readonly list = h('ul', {
-    class: 'messages',
-    role: 'log',
-    tabindex: '0',
-    'aria-label': 'Messages',
-  });
+  private readonly list = h('ul', {});
+  private readonly log = h(
+    'div',
+    { class: 'messages', role: 'log', tabindex: '0', 'aria-label': 'Messages' },
+    this.list,
+  );
   private readonly field = h('input', {
     type: 'text',
     'aria-label': 'Message',
@@ -69,7 +69,7 @@ export class TalkPanel {
     this.field.addEventListener('keydown', ({ key }) => {
       if (key === 'Escape') this.field.blur();
     });
-    this.body = h('div', { class: 'talk-body' }, this.voice.element, this.list, form, this.why);
+    this.body = h('div', { class: 'talk-body' }, this.voice.element, this.log, form, this.why);
     this.element = h(
       'section',
       { class: 'talk', 'aria-label': 'Talk' },
@@ -172,8 +172,8 @@ export class TalkPanel {
       row.remove();
       this.rows.delete(number);
     }
-    const { list } = this;
-    const atEnd = list.scrollHeight - list.scrollTop - list.clientHeight < 40;
+    const { log } = this;
+    const atEnd = log.scrollHeight - log.scrollTop - log.clientHeight < 40;
     for (const message of messages) {
       const row = this.rows.get(message.number) ?? this.addRow(message);
       const look = row.querySelector<HTMLButtonElement>('button');
@@ -182,7 +182,7 @@ export class TalkPanel {
       setText(look, mark ? `look here: ${titleOf(mark)}` : 'the mark is gone');
       look.disabled = !mark;
     }
-    if (atEnd) list.scrollTop = list.scrollHeight;
+    if (atEnd) log.scrollTop = log.scrollHeight;
   }
 
   private addRow(message: ChatMessage): HTMLElement {

@@ -104,6 +104,7 @@ async function firstTask(context) {
       () => false,
     );
     if (placed) break;
+    await ann.press('Escape'); // whatever was typed: the next try begins anew
   }
   await ann.press('v');
   await ann.press('p');
@@ -334,7 +335,7 @@ async function pause(context) {
   const ms = performance.now() - begin;
   check(
     'lifted by key, pictures come back',
-    ms < 3000 && (await picture.isVisible()),
+    ms < 5000 && (await picture.isVisible()),
     `${ms.toFixed(0)} ms`,
   );
 }
