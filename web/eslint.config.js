@@ -8,6 +8,7 @@ const layers = {
   decode: ['scene', 'tools', 'ui', 'session', 'transport'],
   session: ['scene', 'tools', 'ui'],
   uplink: ['scene', 'tools', 'ui', 'session', 'decode'],
+  talk: ['scene', 'tools', 'ui', 'transport', 'decode', 'uplink'],
   tools: ['scene', 'ui', 'transport'],
   scene: ['ui', 'transport'],
 };
@@ -55,7 +56,9 @@ export default tseslint.config(
               group: [`../${name}/*`],
               message: `${folder} must not see ${name}`,
             })),
-            ...(['geometry', 'session', 'transport', 'uplink', 'decode', 'tools'].includes(folder)
+            ...(['geometry', 'session', 'transport', 'uplink', 'decode', 'talk', 'tools'].includes(
+              folder,
+            )
               ? [{ group: ['three', 'three/*'], message: 'three.js belongs to scene' }]
               : []),
           ],
@@ -77,10 +80,15 @@ export default tseslint.config(
         document: 'readonly',
         window: 'readonly',
         sessionStorage: 'readonly',
+        localStorage: 'readonly',
         innerWidth: 'readonly',
         innerHeight: 'readonly',
         getComputedStyle: 'readonly',
         AbortController: 'readonly',
+        AudioContext: 'readonly',
+        AudioNode: 'readonly',
+        AudioWorkletNode: 'readonly',
+        Blob: 'readonly',
       },
     },
   },

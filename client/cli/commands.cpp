@@ -11,7 +11,9 @@
 #include <iostream>
 
 #include "client/cli/access_commands.hpp"
+#include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
+#include "client/cli/waiting_commands.hpp"
 
 namespace saccade::cli {
 
@@ -62,6 +64,11 @@ std::string StatusText(const net::ServerStatus& status) {
   for (const net::Participant& participant : status.participants) {
     absl::StrAppend(&people, people.empty() ? "" : ", ", participant.display_name, " (",
                     Word(participant.role), ")");
+  }
+  if (status.picture_pause.paused) {
+    rows.push_back(
+        {"picture", absl::StrCat("paused by ", status.picture_pause.by, " since ",
+                                 TimeText(status.picture_pause.since_unix_ns / 1'000'000'000))});
   }
   rows.push_back({"present", people.empty() ? "nobody" : people});
   return Table(rows);
@@ -212,6 +219,10 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kWaiting:
     case Command::kAdmit:
       return RunAccess(options);
+    case Command::kSay:
+    case Command::kMessages:
+    case Command::kPausePicture:
+      return RunTalk(options);
     case Command::kCameras:
     case Command::kRecord:
     case Command::kCalibrateCamera:

@@ -99,6 +99,10 @@ json ToJson(const net::Statistics& s) {
 json ToJson(const net::ServerStatus& status) {
   return {{"source", status.source},
           {"source_ended", status.source_ended},
+          {"picture_pause",
+           {{"paused", status.picture_pause.paused},
+            {"by", status.picture_pause.by},
+            {"since_unix_ns", std::to_string(status.picture_pause.since_unix_ns)}}},
           {"server_version", status.server_version},
           {"uptime_s", status.uptime_s},
           {"pose", ToJson(status.pose)},

@@ -13,6 +13,7 @@
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/record_command.hpp"
+#include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
 #include "shared/version/version.hpp"
 
@@ -95,6 +96,9 @@ Command CommandOf(const CLI::App& app) {
       {"audit", Command::kAudit},
       {"waiting", Command::kWaiting},
       {"admit", Command::kAdmit},
+      {"say", Command::kSay},
+      {"messages", Command::kMessages},
+      {"pause-picture", Command::kPausePicture},
       {"cameras", Command::kCameras},
       {"record", Command::kRecord},
       {"calibrate-camera", Command::kCalibrateCamera}};
@@ -159,6 +163,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddGaze(app, options, raw);
   AddCalibrateMount(app, options);
   AddAccess(app, options);
+  AddTalk(app, options);
   AddMachine(app, options);
 
   try {

@@ -45,6 +45,9 @@ enum class Command {
   kAudit,
   kWaiting,
   kAdmit,
+  kSay,
+  kMessages,
+  kPausePicture,
   kCameras,  // of this machine; asks no server
   kRecord,   // likewise
   kCalibrateCamera,
@@ -79,6 +82,9 @@ struct Options {
   std::uint32_t uses = 1;     // invite
   bool waiting_room = false;  // invite: who comes by it waits
   bool refuse = false;        // admit: sends them away instead
+  std::string text;           // say
+  bool follow = false;        // messages
+  bool pause = false;         // pause-picture
   double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
   struct Record {
     std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them

@@ -94,15 +94,18 @@ std::vector<Participant> FromProto(const v1::PresenceEvent& message) {
 absl::StatusOr<ServerStatus> FromProto(const v1::GetStatusResponse& message) {
   absl::StatusOr<MapSnapshot> pose = PoseOrNone(message.has_pose(), message.pose());
   if (!pose.ok()) return pose.status();
-  return ServerStatus{.pose = *std::move(pose),
-                      .statistics = FromProto(message.statistics()),
-                      .participants = FromProto(message.presence()),
-                      .map_features = message.map_features(),
-                      .annotations = message.annotations(),
-                      .source = message.source(),
-                      .server_version = message.server_version(),
-                      .uptime_s = message.uptime_s(),
-                      .source_ended = message.source_ended()};
+  return ServerStatus{
+      .pose = *std::move(pose),
+      .statistics = FromProto(message.statistics()),
+      .participants = FromProto(message.presence()),
+      .map_features = message.map_features(),
+      .annotations = message.annotations(),
+      .source = message.source(),
+      .server_version = message.server_version(),
+      .uptime_s = message.uptime_s(),
+      .source_ended = message.source_ended(),
+      .picture_pause = {message.picture_pause().paused(), message.picture_pause().by(),
+                        message.picture_pause().since_unix_ns()}};
 }
 
 absl::StatusOr<MapState> FromProto(const v1::GetMapResponse& message) {

@@ -36,6 +36,13 @@ struct Statistics {
   double encode_ms_p50 = 0, encode_ms_p95 = 0;
 };
 
+/// The wearer's large pause. `by` is who said so last; empty: nobody did.
+struct PicturePause {
+  bool paused = false;
+  std::string by;
+  std::int64_t since_unix_ns = 0;
+};
+
 struct ServerStatus {
   MapSnapshot pose;  // of the newest frame, without features
   Statistics statistics;
@@ -46,6 +53,7 @@ struct ServerStatus {
   std::string server_version;
   double uptime_s = 0;
   bool source_ended = false;
+  PicturePause picture_pause;
 };
 
 struct MapState {

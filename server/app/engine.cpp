@@ -6,11 +6,8 @@
 #include <bit>
 #include <condition_variable>
 #include <mutex>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "server/app/crop_view.hpp"
 #include "server/app/memory.hpp"
 #include "server/capture/gap.hpp"
 #include "shared/io/log.hpp"
@@ -22,13 +19,19 @@ constexpr std::size_t kStillsWaiting = 8;
 constexpr Timestamp kSourceQuiet = 500'000'000;
 constexpr Timestamp kGapAgain = 5'000'000'000;
 
-const cv::Mat& PictureOf(const Frame& frame) {
-  return frame.color.empty() ? frame.grey : frame.color;
-}
-
 /// As status and page show it.
 std::string NameOf(const SourceInfo& info) {
   return info.remark.empty() ? info.uri : absl::StrCat(info.uri, " (", info.remark, ")");
+}
+
+// Of the click that it is about, if it is about one.
+const PixelTarget* ClickOf(const Command& command) {
+  if (const auto* create = std::get_if<CreateAnnotation>(&command)) {
+    return std::get_if<PixelTarget>(&create->draft.target);
+  }
+  const auto* update = std::get_if<UpdateAnnotation>(&command);
+  if (update == nullptr || !update->patch.target) return nullptr;
+  return std::get_if<PixelTarget>(&*update->patch.target);
 }
 
 constexpr int kTrimEveryS = 2;
@@ -40,6 +43,7 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, Event
     : options_(std::move(options)),
       facts_{options_.version, NameOf(source->info()), source->info().camera},
       sink_(sink),
+      pictures_(options_.pictures ? options_.pictures : *PictureSwitch::Open("")),
       source_(std::move(source)),
       inbox_(options_.mailbox),
       clock_(/*paced=*/!options_.every_frame),
@@ -50,12 +54,17 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, Event
         options_.mount, options_.gaze, options_.mailbox,
         [this](const std::shared_ptr<const GazeSnapshot>& state) { sink_.OnGaze(state); });
   }
+  const MayShow may_show = [pictures = pictures_](FrameId id) {
+    return pictures->MayShow(id).ok();
+  };
   views_[static_cast<std::size_t>(VideoView::kRaw)] = std::make_unique<ViewEncoder>(
       VideoView::kRaw, options_.video_bit_rate_bit_s,
-      [](const TrackedFrame& frame) { return PictureOf(*frame.frame); }, sink_);
+      [](const TrackedFrame& frame) { return PictureOf(*frame.frame); }, may_show, sink_);
   views_[static_cast<std::size_t>(VideoView::kAugmented)] = std::make_unique<ViewEncoder>(
       VideoView::kAugmented, options_.video_bit_rate_bit_s,
-      [this](const TrackedFrame& frame) { return DrawAugmented(frame); }, sink_);
+      [this](const TrackedFrame& frame) { return DrawAugmented(frame); }, may_show, sink_);
+  pictures_->SetOnChange(
+      [this](const std::shared_ptr<const PicturePause>& state) { OnPicturePause(state); });
 }
 
 Engine::~Engine() { Stop(); }
@@ -89,6 +98,7 @@ void Engine::Stop() {
   for (std::jthread* thread : {&source_thread_, &tracker_thread_, &clock_thread_}) {
     thread->request_stop();
   }
+  pictures_->Stop();
   source_->Stop();           // its next frame may not be due for long
   if (gaze_) gaze_->Stop();  // the head stops now, however long the frame takes that is tracked
   for (const Command& command : inbox_.Close()) {
@@ -146,12 +156,13 @@ void Engine::Track(Frame frame) {
     const std::shared_ptr<const GazeSnapshot> state = gaze_->snapshot();
     if (state->calibration && state->calibration->running) frame.mount.reset();
   }
+  const Timestamp captured_ns = clock_.ToMonotonic(frame.capture_time_ns, frame.received_time_ns);
+  pictures_->Note(frame.id, captured_ns);  // before the ring has it, and with it anybody
   const WearableStep& step = wearable_->Step(std::move(frame));
   TrackedFrame next{.frame = step.frame, .tracked = {}};
   TrackedEvent& tracked = next.tracked;
   tracked.camera = step.frame->camera;
-  tracked.stages.captured_ns =
-      clock_.ToMonotonic(step.frame->capture_time_ns, step.frame->received_time_ns);
+  tracked.stages.captured_ns = captured_ns;
   tracked.stages.received_ns = step.frame->received_time_ns;
   last_ = std::move(next);
   for (const AnchorMoved& moved : step.moved) {
@@ -207,6 +218,7 @@ void Engine::Publish(bool new_frame) {
   last_->tracked.snapshot = published_snapshot_;
   last_->tracked.annotations = wearable_->annotations();
   sink_.OnTracked(last_->tracked);
+  if (!pictures_->MayShow(last_->frame->id).ok()) return;
   for (const auto& view : views_) new_frame ? view->Post(*last_) : view->Redraw(*last_);
 }
 
@@ -227,7 +239,12 @@ void Engine::RunClock(std::stop_token stop) {
   }
 }
 
-absl::Status Engine::Submit(Command command) { return inbox_.Submit(std::move(command)); }
+absl::Status Engine::Submit(Command command) {
+  if (const PixelTarget* click = ClickOf(command)) {
+    if (absl::Status may = pictures_->MayClick(click->frame_id); !may.ok()) return may;
+  }
+  return inbox_.Submit(std::move(command));
+}
 
 std::shared_ptr<const AnnotationList> Engine::annotations() const {
   return wearable_->annotations();
@@ -261,64 +278,6 @@ void Engine::SetVideoDemand(VideoView view, bool wanted) {
 
 void Engine::RequestKeyFrame(VideoView view) {
   views_[static_cast<std::size_t>(view)]->RequestKeyFrame();
-}
-
-void Engine::GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) {
-  absl::StatusOr<PastFrame> past =
-      frame_id ? wearable_->ring().Find(*frame_id) : wearable_->ring().Newest();
-  if (!past.ok()) return done(past.status());
-  wearable_->ring().Hold(*past);
-  const absl::Status queued = stills_.Post({*std::move(past), view, done});
-  if (!queued.ok()) done(queued);
-}
-
-void Engine::MakeStill(StillRequest request) {
-  TrackedFrame frame{.frame = request.past.frame, .tracked = {}};
-  frame.tracked.snapshot = request.past.snapshot;
-  frame.tracked.camera = request.past.frame->camera;
-  frame.tracked.annotations = wearable_->annotations();
-  frame.tracked.stages.captured_ns = request.past.frame->received_time_ns;
-  std::vector<uchar> png;
-  try {
-    const cv::Mat picture =
-        request.view == VideoView::kAugmented ? DrawAugmented(frame) : PictureOf(*frame.frame);
-    // Level 1: a third of the time of the default for a tenth more bytes.
-    cv::imencode(".png", picture, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  } catch (const std::exception&) {  // no memory, or what OpenCV will not draw: said below
-    png.clear();
-  }
-  if (png.empty()) {
-    return request.done(absl::InternalError("the picture could not be coded as PNG"));
-  }
-  request.done(Still{std::make_shared<const std::string>(png.begin(), png.end()), frame.tracked});
-}
-
-cv::Mat Engine::DrawAugmented(const TrackedFrame& frame) const {
-  OverlayOptions overlay = options_.overlay;
-  const std::shared_ptr<const GazeSnapshot> state = gaze();
-  if (state->target) {  // green
-    if (const auto* feature = std::get_if<GazeFeature>(&*state->target)) {
-      overlay.fixated_feature = feature->id;
-    } else if (const auto* annotation = std::get_if<GazeAnnotation>(&*state->target)) {
-      overlay.fixated_annotation = annotation->id;
-    }
-  }
-  overlay.picture = [this](const PicturePtr& one) { return gallery_.Find(one); };
-  {
-    const std::lock_guard lock(pointers_mutex_);
-    overlay.pointers = pointers_;
-  }
-  cv::Mat picture =
-      Augment(*frame.frame, *frame.tracked.snapshot, *frame.tracked.annotations, overlay);
-  if (options_.crop) {
-    const Eigen::Quaterniond world_from_camera = frame.tracked.snapshot->world_from_camera.rotation;
-    picture =
-        CropView(picture, *frame.tracked.camera, *options_.crop,
-                 state->world_from_view ? world_from_camera.conjugate() * *state->world_from_view
-                                        : Eigen::Quaterniond::Identity());
-  }
-  if (state->guidance_rad) DrawGuidance(*state->guidance_rad, picture);
-  return picture;
 }
 
 EngineStatistics Engine::Statistics() const {

@@ -13,6 +13,7 @@
 #include "server/app/frame_clock.hpp"
 #include "server/app/gaze_runner.hpp"
 #include "server/app/picture_gallery.hpp"
+#include "server/app/picture_switch.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/capture/frame_source.hpp"
 #include "server/overlay/overlay.hpp"
@@ -35,6 +36,7 @@ struct EngineOptions {
   /// the camera itself is fixed.
   std::optional<CameraIntrinsics> crop;
   GazeOptions gaze;
+  std::shared_ptr<PictureSwitch> pictures;  // null: one that keeps nothing
 };
 
 /// Capture to packets: owns the threads and what they share.
@@ -75,6 +77,8 @@ class Engine : public Backend {
   void SetPresence(std::shared_ptr<const ParticipantSet> present) override;
   void SetVideoDemand(VideoView view, bool wanted) override;
   void RequestKeyFrame(VideoView view) override;
+  void PausePicture(bool paused, std::string by, Done<PicturePause> done) override;
+  std::shared_ptr<const PicturePause> picture_pause() const override;
 
  private:
   // What the tracker thread waits for: a frame, the end of the source, or (neither) a second
@@ -91,6 +95,7 @@ class Engine : public Backend {
 
   Engine(EngineOptions options, std::unique_ptr<FrameSource> source, EventSink& sink);
 
+  void OnPicturePause(const std::shared_ptr<const PicturePause>& state);
   void RunSource(std::stop_token stop);
   void RunTracker(std::stop_token stop);
   void RunClock(std::stop_token stop);
@@ -107,6 +112,7 @@ class Engine : public Backend {
   const EngineOptions options_;
   ServerFacts facts_;
   EventSink& sink_;
+  const std::shared_ptr<PictureSwitch> pictures_;
   std::unique_ptr<FrameSource> source_;  // source thread
   std::unique_ptr<Wearable> wearable_;   // tracker thread, but for what says otherwise
   Inbox<Input, Command> inbox_;

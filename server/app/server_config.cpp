@@ -35,6 +35,7 @@ struct Raw {
                               client_ca;
   std::map<std::string, AccessRole> client_roles;
   bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
+  bool overlay_dots = false, overlay_axes = false, overlay_status = false;
   double run_for_s = -1.0;
   std::int64_t bit_rate = 0;
   std::int64_t seed = 1;
@@ -81,6 +82,11 @@ const std::vector<Setting>& Settings() {
        "PEM file: a client's certificate by it is an identity, its role in [client_roles]"},
       {"tls.required", nullptr, &Raw::tls_required, "TLS on loopback, too"},
       {"auth.required", nullptr, &Raw::auth_required, "invites on loopback, too"},
+      {"overlay.dots", nullptr, &Raw::overlay_dots,
+       "the tracker's features in the augmented view, which is the wearer's"},
+      {"overlay.axes", nullptr, &Raw::overlay_axes, "the world's axes in it"},
+      {"overlay.status", nullptr, &Raw::overlay_status,
+       "how tracking goes, as a line in it; the wearer's page says it beside the picture"},
   };
   return settings;
 }
@@ -334,6 +340,9 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   }
   config.web_root = raw.web_root;
   if (raw.seed < 0) return Bad(absl::StrCat("seed: ", raw.seed, ": give a whole number from 0"));
+  config.overlay_dots = raw.overlay_dots;
+  config.overlay_axes = raw.overlay_axes;
+  config.overlay_status = raw.overlay_status;
   config.seed = static_cast<std::uint64_t>(raw.seed);
   config.config_file = raw.config;
   return config;

@@ -46,6 +46,8 @@ struct ServerConfig {
   bool every_frame = false;  // --speed max
   std::optional<double> run_for_s;
   std::filesystem::path sim_truth;
+  // [overlay]: in the augmented view, beside marks
+  bool overlay_dots = false, overlay_axes = false, overlay_status = false;
   // Only in the file: reasons to change them are rare.
   int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size
   LimitSettings limits;            // [limits]

@@ -85,6 +85,12 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, E
   shutdown.SetPhase("opening the data base");
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);
   if (!store.ok()) return store.status();
+  absl::StatusOr<std::unique_ptr<PictureSwitch>> pictures = PictureSwitch::Open(config.data_dir);
+  if (!pictures.ok()) return pictures.status();
+  options.pictures = *std::move(pictures);
+  options.overlay.features = config.overlay_dots;
+  options.overlay.world_axes = config.overlay_axes;
+  options.overlay.status_line = config.overlay_status;
   options.version = Version();
   ApplyLimits(config, options.anchors);
   options.mount = opened->mount.mount;

@@ -25,10 +25,12 @@ VideoEncoderOptions VideoOptions(int width, int height, double fps_hz, int bit_r
   return options;
 }
 
-ViewEncoder::ViewEncoder(VideoView view, int bit_rate_bit_s, DrawView draw, EventSink& sink)
+ViewEncoder::ViewEncoder(VideoView view, int bit_rate_bit_s, DrawView draw, MayShow may_show,
+                         EventSink& sink)
     : view_(view),
       bit_rate_bit_s_(bit_rate_bit_s),
       draw_(std::move(draw)),
+      may_show_(std::move(may_show)),
       sink_(sink),
       runner_({.capacity = 1, .when_full = WhenFull::kDropOldest},
               [this](const TrackedFrame& frame) { Step(frame); }) {}
@@ -69,6 +71,11 @@ void ViewEncoder::Tick() {
 void ViewEncoder::RequestKeyFrame() {
   key_requested_ = true;
   PostAgain();
+}
+
+void ViewEncoder::AwaitFrame() {
+  const std::lock_guard lock(mutex_);
+  posted_ns_ = MonotonicNow();
 }
 
 void ViewEncoder::PostAgain() {
@@ -123,6 +130,7 @@ absl::StatusOr<EncodedPicture> ViewEncoder::DrawAndCode(const TrackedFrame& fram
 }
 
 void ViewEncoder::Step(const TrackedFrame& frame) {
+  if (!may_show_(frame.frame->id)) return;
   const Timestamp begin_ns = MonotonicNow();
   const absl::StatusOr<EncodedPicture> coded = DrawAndCode(frame);
   if (!coded.ok()) {

@@ -20,12 +20,19 @@ struct TrackedFrame {
   TrackedEvent tracked;
 };
 
+/// In colour where there is colour.
+inline const cv::Mat& PictureOf(const Frame& frame) {
+  return frame.color.empty() ? frame.grey : frame.color;
+}
+
 /// How a view of this size is coded. The encoder takes 1 to 240 pictures a second; a camera outside
 /// that is coded as if at the nearest.
 VideoEncoderOptions VideoOptions(int width, int height, double fps_hz, int bit_rate_bit_s);
 
 /// The picture of one view. Any thread.
 using DrawView = std::function<cv::Mat(const TrackedFrame&)>;
+/// Whether the frame may be seen now. Any thread.
+using MayShow = std::function<bool(FrameId)>;
 
 /// Draws and codes one view on a thread of its own, once for all who watch and only while somebody
 /// does. A frame that finds the encoder busy replaces the one that waits.
@@ -33,7 +40,8 @@ class ViewEncoder {
  public:
   /// `sink` hears of each packet on the encoder's thread. `bit_rate_bit_s` 0: the encoder's
   /// default.
-  ViewEncoder(VideoView view, int bit_rate_bit_s, DrawView draw, EventSink& sink);
+  /// Frames that may not be shown are not coded.
+  ViewEncoder(VideoView view, int bit_rate_bit_s, DrawView draw, MayShow may_show, EventSink& sink);
   ~ViewEncoder() { Stop(); }
   void Stop() { runner_.Stop(); }
 
@@ -50,6 +58,8 @@ class ViewEncoder {
   /// The next picture becomes a key frame, at most four times a second; if no frame comes, because
   /// the source ended or stands still, the last one is coded again.
   void RequestKeyFrame();
+  /// Pictures may be shown again: the next frame has time to come before the last one is coded anew.
+  void AwaitFrame();
 
   RollingStatistics::Summary milliseconds() const { return milliseconds_.At(MonotonicNow()); }
   double bit_rate_bit_s() const { return bits_.At(MonotonicNow()).sum_per_second; }
@@ -66,6 +76,7 @@ class ViewEncoder {
   const VideoView view_;
   const int bit_rate_bit_s_;
   const DrawView draw_;
+  const MayShow may_show_;
   EventSink& sink_;
   RollingStatistics milliseconds_;  // to draw and code one picture
   RollingStatistics bits_;

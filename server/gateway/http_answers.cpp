@@ -20,13 +20,14 @@ constexpr char kContentSecurityPolicy[] =
 // gRPC's numbers, as far as this side needs them.
 constexpr int kResourceExhausted = 8;
 
-/// What a page may ask the browser's user for: the wearer's phone for its camera and its motion.
+/// What a page may ask the browser's user for: all for the microphone, to talk; the wearer's phone
+/// for its camera and its motion.
 const char* PermissionsOf(absl::string_view target) {
   const absl::string_view path = target.substr(0, target.find_first_of("?#"));
   return path == "/wear" || path == "/wear.html"
              ? "camera=(self), accelerometer=(self), gyroscope=(self), screen-wake-lock=(self), "
-               "microphone=(), geolocation=()"
-             : "camera=(), microphone=(), geolocation=()";
+               "microphone=(self), geolocation=()"
+             : "camera=(), microphone=(self), geolocation=()";
 }
 
 }  // namespace

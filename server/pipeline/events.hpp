@@ -54,8 +54,16 @@ struct EngineStatistics {
   double track_ms_p50 = 0, track_ms_p95 = 0, encode_ms_p50 = 0, encode_ms_p95 = 0;
 };
 
+/// Whether the wearer keeps everybody from seeing: no video, stills or snapshots while tracking
+/// goes on.
+struct PicturePause {
+  bool paused = false;
+  std::string by;                  // display name of who said so last; empty: nobody yet
+  std::int64_t since_unix_ns = 0;  // 0: as the server started
+};
+
 /// Who hears of what happens: the gRPC streams here, a message broker on another machine later.
-/// Calls come from the tracker, gaze and encode threads and must not block.
+/// Calls come from the engine's threads and must not block.
 class EventSink {
  public:
   virtual ~EventSink() = default;
@@ -64,6 +72,8 @@ class EventSink {
   virtual void OnStatistics(const EngineStatistics& statistics) = 0;
   virtual void OnGaze(const std::shared_ptr<const GazeSnapshot>& state) = 0;
   virtual void OnEndOfSource(std::uint64_t frames) = 0;
+  /// Once it returns, no picture goes out that was not on its way, until pictures are let go again.
+  virtual void OnPicturePause(const std::shared_ptr<const PicturePause>& state) = 0;
 };
 
 }  // namespace saccade

@@ -9,16 +9,9 @@
 namespace saccade {
 namespace {
 
-constexpr const char* kWhat[kTolls] = {"joins",
-                                       "streams opened",
-                                       "edits",
-                                       "resets of the map",
-                                       "stills",
-                                       "gaze commands",
-                                       "questions",
-                                       "invites redeemed",
-                                       "words of pointers",
-                                       "pictures"};
+constexpr const char* kWhat[kTolls] = {
+    "joins", "streams opened", "edits", "resets of the map", "stills", "gaze commands", "questions",
+    "invites redeemed", "words of pointers", "pictures", "messages", "packets of voice"};
 
 absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const char* whose) {
   if (!wait_ns) return absl::OkStatus();
@@ -29,19 +22,22 @@ absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const cha
 
 const RpcLimits::Kind& RpcLimits::of(Toll toll) const {
   const Kind* const kinds[kTolls] = {&join, &subscribe, &edit,   &reset, &still,
-                                     &gaze, &read,      &redeem, &point, &picture};
+                                     &gaze, &read,      &redeem, &point, &picture, &say,   &speak};
   return *kinds[static_cast<int>(toll)];
 }
 
 RpcLimits RpcLimits::Scaled(double factor) const {
   RpcLimits scaled = *this;
   for (Kind* kind : {&scaled.join, &scaled.subscribe, &scaled.edit, &scaled.reset, &scaled.still,
-                     &scaled.gaze, &scaled.read, &scaled.redeem, &scaled.point, &scaled.picture}) {
+                     &scaled.gaze, &scaled.read, &scaled.redeem, &scaled.point, &scaled.picture,
+                     &scaled.say, &scaled.speak}) {
     for (RateLimit* limit : {&kind->courtesy, &kind->session, &kind->peer, &kind->server}) {
       limit->per_s *= factor;
       limit->burst = std::max(1.0, limit->burst * factor);
     }
   }
+  scaled.voice_packets.per_s *= factor;
+  scaled.voice_packets.burst = std::max(1.0, scaled.voice_packets.burst * factor);
   return scaled;
 }
 

@@ -21,7 +21,9 @@ enum class Toll {
   kRead,
   kRedeem,
   kPoint,
-  kPicture
+  kPicture,
+  kSay,
+  kSpeak
 };
 inline constexpr int kTolls = 10;
 
@@ -46,6 +48,11 @@ struct RpcLimits {
   Kind point{{60, 120}, {120, 240}, {600, 1200}, {}};  // 60 a second, and who catches up
   Kind picture{{}, {0.5, 8}, {2, 16}, {4, 32}};        // pinned: up to half a second of a core each
   Kind redeem{{}, {}, {1, 20}, {}};  // of invites, by strangers: nobody else's joins pay for them
+
+  Kind say{{}, {1, 10}, {10, 60}, {20, 100}};         // told to everybody
+  Kind speak{{60, 120}, {60, 240}, {600, 2400}, {}};  // a batch each 20 ms
+  /// Packets of one speaker, beside what `speak` says of calls: 50 a second are spoken.
+  RateLimit voice_packets{75, 150};
 
   const Kind& of(Toll toll) const;
   /// Every rate and burst times `factor`; 0: no limits, for laboratories.

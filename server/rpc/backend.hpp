@@ -49,6 +49,7 @@ class Backend : public CommandPort {
   /// Encodes on another thread. `frame_id` absent: newest. Errors go to `done`:
   ///   NotFound           no longer, or not yet, in the ring
   ///   ResourceExhausted  too many stills are being made
+  ///   FailedPrecondition the wearer has paused the picture, or had when the frame was taken
   virtual void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) = 0;
   /// Where pointers point: PointerPlacer's Locate, and Trace where there is a `surface`.
   virtual absl::StatusOr<std::vector<Eigen::Vector3d>> LocatePointer(
@@ -65,6 +66,11 @@ class Backend : public CommandPort {
   virtual void SetVideoDemand(VideoView view, bool wanted) = 0;
   /// The next picture of `view` will be a key frame. Requests are coalesced.
   virtual void RequestKeyFrame(VideoView view) = 0;
+  /// Stops pictures for everybody, or lets them go again; answered once it is kept over a restart.
+  /// On any error but ResourceExhausted (`done` is told: nothing was done) pictures are stopped.
+  virtual void PausePicture(bool paused, std::string by, Done<PicturePause> done) = 0;
+  /// Never null.
+  virtual std::shared_ptr<const PicturePause> picture_pause() const = 0;
 };
 
 }  // namespace saccade

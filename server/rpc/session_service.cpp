@@ -34,6 +34,8 @@ SessionService::SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gat
   MarkMethodCallback(3, Early(gate, "SessionService/Ping", this, &SessionService::Ping));
   MarkMethodCallback(4, Early(gate, "SessionService/GetFrame", this, &SessionService::GetFrame));
   MarkMethodCallback(5, Early(gate, "SessionService/GetStatus", this, &SessionService::GetStatus));
+  MarkMethodCallback(
+      6, Early(gate, "SessionService/PausePicture", this, &SessionService::PausePicture));
 }
 
 grpc::ServerUnaryReactor* SessionService::Join(grpc::CallbackServerContext* context,
@@ -152,7 +154,26 @@ grpc::ServerUnaryReactor* SessionService::GetStatus(grpc::CallbackServerContext*
   response->set_server_version(backend_.facts().version);
   response->set_uptime_s(Seconds(MonotonicNow() - started_ns_));
   response->set_source_ended(hub_.end_of_source().has_value());
+  *response->mutable_picture_pause() = PicturePauseToProto(*backend_.picture_pause());
   return call.Finish(absl::OkStatus());
+}
+
+grpc::ServerUnaryReactor* SessionService::PausePicture(grpc::CallbackServerContext* context,
+                                                       const v1::PausePictureRequest* request,
+                                                       v1::PausePictureResponse* response) {
+  UnaryCall call(*context, "SessionService/PausePicture", UnaryCall::Log::kAll);
+  const absl::StatusOr<Session> session = call.Member(gate_, Toll::kEdit, request->session_id());
+  if (!session.ok()) return call.Finish(session.status());
+  if (session->role != v1::ROLE_WEARER) {
+    return call.Finish(absl::PermissionDeniedError(
+        "session_id: only the wearer pauses the picture: join as wearer"));
+  }
+  call.set_outcome(request->paused() ? "ok: paused" : "ok: lifted");
+  const auto fill = [response](const PicturePause& state) {
+    *response->mutable_picture_pause() = PicturePauseToProto(state);
+  };
+  backend_.PausePicture(request->paused(), session->display_name, call.Answer<PicturePause>(fill));
+  return call.reactor();
 }
 
 }  // namespace saccade

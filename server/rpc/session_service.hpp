@@ -16,9 +16,11 @@ using SessionServiceBase =
             v1::SessionService::WithCallbackMethod_Ping<
                 v1::SessionService::WithCallbackMethod_GetFrame<
                     v1::SessionService::WithCallbackMethod_GetStatus<
-                        v1::SessionService::Service>>>>>>;
+                        v1::SessionService::WithCallbackMethod_PausePicture<
+                            v1::SessionService::Service>>>>>>>;
 
-/// Joining, the stream, stills, clock. Handlers run on gRPC's threads and never block.
+/// Joining, the stream, stills, clock, the large pause. Handlers run on gRPC's threads and never
+/// block.
 class SessionService final : public SessionServiceBase {
  public:
   SessionService(Backend& backend, StreamHub& hub, Gatekeeper& gate);
@@ -41,6 +43,9 @@ class SessionService final : public SessionServiceBase {
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
                                       const v1::GetStatusRequest* request,
                                       v1::GetStatusResponse* response) override;
+  grpc::ServerUnaryReactor* PausePicture(grpc::CallbackServerContext* context,
+                                         const v1::PausePictureRequest* request,
+                                         v1::PausePictureResponse* response) override;
 
   Backend& backend_;
   StreamHub& hub_;

@@ -13,6 +13,8 @@ namespace {
 constexpr Timestamp kPresenceInterval = 250'000'000;
 // So long a stream that is ended may take to say why.
 constexpr Timestamp kLastWords = 300'000'000;
+// Batches of voice that wait for the hub: seconds of several speakers. Newer ones win.
+constexpr std::size_t kVoiceWaiting = 256;
 
 }  // namespace
 
@@ -43,6 +45,7 @@ void StreamHub::OnTracked(const TrackedEvent& event) {
 
 void StreamHub::OnVideo(const std::shared_ptr<const VideoPacket>& packet) {
   Leave([&](Pending& pending) {
+    if (pause_->paused) return;  // coded just before
     const auto view = static_cast<std::size_t>(packet->view);
     if (packet->key_frame) key_frames_[view].Made();
     pending.video[view].Push(packet);
@@ -63,6 +66,43 @@ void StreamHub::OnEndOfSource(std::uint64_t frames) {
 
 void StreamHub::OnPointers(std::shared_ptr<const PointerList> pointers) {
   Leave([&](Pending& pending) { pointers_ = pending.pointers = std::move(pointers); });
+}
+
+void StreamHub::Connect(Backend* backend) {
+  backend_ = backend;
+  const std::lock_guard lock(mutex_);
+  pause_ = backend->picture_pause();
+}
+
+// By the caller's thread, not in the next round: what waits in a stream is thrown away before this
+// returns. A stream that comes meanwhile has it from Insert.
+void StreamHub::OnPicturePause(const std::shared_ptr<const PicturePause>& state) {
+  std::vector<std::shared_ptr<Subscriber>> streams;
+  {
+    const std::lock_guard lock(mutex_);
+    pause_ = state;
+    for (PacketBacklog& view : pending_.video) view.TakeAll();
+    streams = streams_;
+  }
+  for (const auto& stream : streams) {
+    stream->Update([&state](Subscription& subscription) { subscription.OfferPicturePause(state); });
+  }
+}
+
+void StreamHub::OnVoice(VoiceBatch batch) {
+  Leave([&](Pending& pending) {
+    pending.voice.push_back(std::move(batch));
+    if (pending.voice.size() > kVoiceWaiting) pending.voice.pop_front();
+  });
+}
+
+void StreamHub::OnChat(const std::shared_ptr<const ChatLog>& log) {
+  Leave([&](Pending& pending) {
+    // Two who speak at once may come here in either order.
+    if (!chat_->empty() && chat_->back()->number() >= log->back()->number()) return;
+    chat_ = log;
+    pending.chat = true;
+  });
 }
 
 void StreamHub::AbandonTheSilent(Timestamp now_ns) {
@@ -125,8 +165,14 @@ struct StreamHub::Round {
   std::optional<std::uint64_t> end_frames;
   std::shared_ptr<const v1::PresenceEvent> presence;
   std::shared_ptr<const PointerList> pointers;
+  std::shared_ptr<const ChatLog> chat;
+  std::deque<VoiceBatch> voice;
 
-  void OfferTo(Subscription& subscription) const {
+  void OfferTo(Subscription& subscription, const Session& session) const {
+    for (const VoiceBatch& batch : voice) {
+      if (batch.participant_id != session.participant_id) subscription.OfferVoice(batch);
+    }
+    if (chat) subscription.OfferChat(chat);
     if (state) subscription.Offer(*state, frames_passed_over);
     for (const PacketBacklog::Entry& entry : video) {
       entry.shed ? subscription.Skip(*entry.packet) : subscription.Offer(entry.packet);
@@ -155,6 +201,8 @@ StreamHub::Round StreamHub::Prepare() {
     round.gaze = std::move(pending.gaze);
     round.end_frames = pending.end_frames;
     round.pointers = std::move(pending.pointers);
+    round.voice = std::move(pending.voice);
+    if (pending.chat) round.chat = chat_;
     if (presence_changed_ && now_ns - presence_ns_ >= kPresenceInterval) {
       presence_changed_ = false;
       presence_ns_ = now_ns;
@@ -198,8 +246,9 @@ void StreamHub::GoRound() {
   // Not the same one first each time: who comes late in a round that is too long waits longest.
   first_ = (first_ + streams.size() / 3 + 1) % streams.size();
   for (std::size_t i = 0; i < streams.size(); ++i) {
-    streams[(first_ + i) % streams.size()]->Update(
-        [&round](Subscription& subscription) { round.OfferTo(subscription); });
+    Subscriber& stream = *streams[(first_ + i) % streams.size()];
+    stream.Update(
+        [&](Subscription& subscription) { round.OfferTo(subscription, stream.session()); });
   }
 }
 
@@ -235,6 +284,10 @@ bool StreamHub::Insert(const std::shared_ptr<Subscriber>& subscriber,
                        std::shared_ptr<Subscriber>& replaced) {
   const std::lock_guard lock(mutex_);
   if (closed_) return false;
+  subscriber->Set([this](Subscription& subscription) {
+    subscription.OfferPicturePause(pause_);
+    subscription.OfferChat(chat_);
+  });
   std::shared_ptr<Subscriber>& held = by_session_[subscriber->session().id];
   replaced = std::exchange(held, subscriber);
   if (replaced != nullptr) std::erase(streams_, replaced);
@@ -266,6 +319,7 @@ void StreamHub::StreamsChanged() {
       participant.set_role(stream->session().role);
       participant.set_person_id(stream->session().person_id);
       participant.set_color_rgba(stream->session().color_rgba);
+      participant.set_listens(stream->listens());
       present->insert(stream->session().participant_id);
       if (stream->wants_video()) wanted[static_cast<std::size_t>(stream->view())] = true;
     }

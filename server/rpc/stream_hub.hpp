@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 
 #include <array>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -37,13 +38,20 @@ class Subscriber {
     return subscription_.options().topics.test(static_cast<std::size_t>(v1::TOPIC_VIDEO));
   }
 
+  bool listens() const {
+    return subscription_.options().topics.test(static_cast<std::size_t>(v1::TOPIC_VOICE));
+  }
+
+  /// Runs `change` on the subscription under its lock, without writing.
+  template <typename Change>
+  void Set(Change change) {
+    const std::lock_guard lock(mutex_);
+    change(subscription_);
+  }
   /// Runs `change` on the subscription under its lock, then writes what has become due.
   template <typename Change>
   void Update(Change change) {
-    {
-      const std::lock_guard lock(mutex_);
-      change(subscription_);
-    }
+    Set(change);
     Pump();
   }
 
@@ -80,7 +88,7 @@ class StreamHub : public EventSink {
   ~StreamHub() override;
 
   /// Where key frames are asked for. Before the first Add; `backend` outlives the hub's streams.
-  void Connect(Backend* backend) { backend_ = backend; }
+  void Connect(Backend* backend);
   Backend* backend() const { return backend_; }
   /// What the streams share of their events.
   const std::shared_ptr<EventBytes>& bytes() const { return bytes_; }
@@ -92,6 +100,12 @@ class StreamHub : public EventSink {
   void OnEndOfSource(std::uint64_t frames) override;
   /// What is pointed at now. Any thread; must come in order.
   void OnPointers(std::shared_ptr<const PointerList> pointers);
+  void OnPicturePause(const std::shared_ptr<const PicturePause>& state) override;
+
+  /// To everybody who listens but the speaker.
+  void OnVoice(VoiceBatch batch);
+  /// The conversation with what was said last. `log` as ChatBook has it.
+  void OnChat(const std::shared_ptr<const ChatLog>& log);
 
   /// Opens a stream; one that the same session had is closed (Aborted).
   void Add(const std::shared_ptr<Subscriber>& subscriber);
@@ -124,6 +138,8 @@ class StreamHub : public EventSink {
     std::shared_ptr<const GazeSnapshot> gaze;
     std::optional<std::uint64_t> end_frames;
     std::shared_ptr<const PointerList> pointers;
+    std::deque<VoiceBatch> voice;
+    bool chat = false;
   };
   struct Wake {};
   /// The same, worked out and ready to be offered.
@@ -157,6 +173,8 @@ class StreamHub : public EventSink {
   std::shared_ptr<const v1::PresenceEvent> presence_;
   std::optional<std::uint64_t> end_frames_;
   std::shared_ptr<const PointerList> pointers_;  // null: none so far
+  std::shared_ptr<const PicturePause> pause_ = std::make_shared<const PicturePause>();
+  std::shared_ptr<const ChatLog> chat_ = std::make_shared<const ChatLog>();
   Pending pending_;
   bool presence_changed_ = false;
   std::array<KeyFrameRequests, kVideoViews> key_frames_;

@@ -7,6 +7,7 @@ namespace {
 
 constexpr std::uint32_t kDefaultWindow = 32;
 constexpr std::uint32_t kMaxWindow = 256;
+constexpr std::ptrdiff_t kMessagesOfEvent = 100;  // 60 KB
 
 // What only this subscriber's stream knows of a picture; merges with its other stages.
 std::string QueuedStage(Timestamp now_ns) {
@@ -24,7 +25,7 @@ Bytes Serialized(const google::protobuf::Message& message) {
 absl::StatusOr<SubscriptionOptions> SubscriptionOptions::FromProto(
     const v1::SubscribeRequest& request) {
   SubscriptionOptions options;
-  if (request.topics().empty()) options.topics.set();
+  if (request.topics().empty()) options.topics.set().reset(v1::TOPIC_VOICE);
   for (int i = 0; i < request.topics_size(); ++i) {
     const int topic = request.topics(i);
     if (topic == v1::TOPIC_UNSPECIFIED || !v1::Topic_IsValid(topic)) {
@@ -56,6 +57,7 @@ void Subscription::Offer(const NumberedState& state, std::uint64_t frames_passed
 }
 
 void Subscription::Offer(const std::shared_ptr<const VideoPacket>& packet) {
+  if (pause_ && pause_->paused) return;
   if (Has(v1::TOPIC_VIDEO) && packet->view == options_.view) video_.Push(packet);
 }
 
@@ -77,6 +79,22 @@ void Subscription::OfferPresence(std::shared_ptr<const v1::PresenceEvent> presen
   presence_ = std::move(presence);
 }
 
+void Subscription::OfferChat(std::shared_ptr<const ChatLog> log) {
+  if (chat_ == nullptr && !log->empty()) chat_sent_ = log->back()->number();
+  chat_ = std::move(log);
+}
+
+void Subscription::OfferVoice(const VoiceBatch& batch) {
+  if (Has(v1::TOPIC_VOICE)) voice_.Push(batch);
+}
+
+void Subscription::OfferPicturePause(std::shared_ptr<const PicturePause> state) {
+  if (state == pause_) return;
+  pause_ = std::move(state);
+  pause_due_ = true;
+  if (pause_->paused) video_.RequireKeyFrame();
+}
+
 absl::Status Subscription::Acknowledge(std::uint64_t sequence, bool request_key_frame,
                                        Timestamp now_ns) {
   if (sequence > sequence_) {
@@ -93,22 +111,23 @@ absl::Status Subscription::Acknowledge(std::uint64_t sequence, bool request_key_
 }
 
 bool Subscription::WantsKeyFrame(Timestamp now_ns) {
+  if (pause_ && pause_->paused) return false;
   return Has(v1::TOPIC_VIDEO) && WindowOpen() && video_.WantsKeyFrame(now_ns);
 }
 
 bool Subscription::Next(Timestamp now_ns, EncodedEvent& event) {
-  if (!WindowOpen()) return false;
-  for (int turn = 1; turn <= kKinds; ++turn) {
+  std::optional<Payload> payload;
+  if (WindowOpen(kVoiceBeyond)) payload = FillVoice();
+  for (int turn = 1; !payload && WindowOpen() && turn <= kKinds; ++turn) {
     const int kind = (last_kind_ + turn) % kKinds;
-    std::optional<Payload> payload = Fill(static_cast<Kind>(kind), now_ns);
-    if (!payload) continue;
-    event = EncodedEvent::Of(++sequence_, payload->field, std::move(payload->bytes),
-                             std::move(payload->tail));
-    if (!unacknowledged_since_) unacknowledged_since_ = now_ns;
-    last_kind_ = kind;
-    return true;
+    payload = Fill(static_cast<Kind>(kind), now_ns);
+    if (payload) last_kind_ = kind;
   }
-  return false;
+  if (!payload) return false;
+  event = EncodedEvent::Of(++sequence_, payload->field, std::move(payload->bytes),
+                           std::move(payload->tail));
+  if (!unacknowledged_since_) unacknowledged_since_ = now_ns;
+  return true;
 }
 
 std::optional<Subscription::Payload> Subscription::Fill(Kind kind, Timestamp now_ns) {
@@ -124,6 +143,11 @@ std::optional<Subscription::Payload> Subscription::Fill(Kind kind, Timestamp now
     case kGaze:
       if (!Has(v1::TOPIC_GAZE) || gaze_ == nullptr) return std::nullopt;
       return Payload{v1::Event::kGazeFieldNumber, bytes_->Gaze(std::exchange(gaze_, {}))};
+    case kPicturePause:
+      if (!Has(v1::TOPIC_PICTURE_PAUSE) || !std::exchange(pause_due_, false)) return std::nullopt;
+      return Payload{v1::Event::kPicturePauseFieldNumber, Serialized(PicturePauseToProto(*pause_))};
+    case kChat:
+      return FillChat();
     case kPose:
       if (!Has(v1::TOPIC_POSE) || !std::exchange(pose_due_, false)) return std::nullopt;
       return Payload{v1::Event::kPoseFieldNumber, bytes_->Pose(state_->tracked)};
@@ -182,6 +206,33 @@ std::optional<Subscription::Payload> Subscription::FillPointers() {
   pointers_due_ = !pointer_reader_.complete();
   if (!any) return std::nullopt;
   return Payload{v1::Event::kPointerFieldNumber, Serialized(event)};
+}
+
+// Who is behind gets it in parts; what is no longer kept is left out.
+std::optional<Subscription::Payload> Subscription::FillChat() {
+  if (!Has(v1::TOPIC_CHAT) || chat_ == nullptr) return std::nullopt;
+  const auto first = After(*chat_, chat_sent_);
+  if (first == chat_->end()) return std::nullopt;
+  v1::ChatEvent event;
+  for (auto at = first; at != chat_->end() && at - first < kMessagesOfEvent; ++at) {
+    *event.add_messages() = **at;
+    chat_sent_ = (*at)->number();
+  }
+  return Payload{v1::Event::kChatFieldNumber, Serialized(event)};
+}
+
+std::optional<Subscription::Payload> Subscription::FillVoice() {
+  v1::VoiceEvent event;
+  if (!voice_.Take(event)) return std::nullopt;
+  return Payload{v1::Event::kVoiceFieldNumber, Serialized(event)};
+}
+
+v1::PicturePause PicturePauseToProto(const PicturePause& state) {
+  v1::PicturePause message;
+  message.set_paused(state.paused);
+  message.set_by(state.by);
+  message.set_since_unix_ns(state.since_unix_ns);
+  return message;
 }
 
 v1::StatisticsEvent StatisticsToProto(const EngineStatistics& statistics,

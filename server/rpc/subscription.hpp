@@ -14,10 +14,12 @@
 #include "saccade/v1/session.pb.h"
 #include "server/pipeline/events.hpp"
 #include "server/pipeline/pointers.hpp"
+#include "server/rpc/chat_book.hpp"
 #include "server/rpc/deltas.hpp"
 #include "server/rpc/event_bytes.hpp"
 #include "server/rpc/pointer_reader.hpp"
 #include "server/rpc/video_queue.hpp"
+#include "server/rpc/voice_queue.hpp"
 
 namespace saccade {
 
@@ -59,12 +61,20 @@ class Subscription {
     if (!std::exchange(end_seen_, true)) end_frames_ = frames;
   }
 
+  /// Of the conversation what is newer than the last one offered; of the first one nothing.
+  void OfferChat(std::shared_ptr<const ChatLog> log);
+  void OfferVoice(const VoiceBatch& batch);
+  /// While it is paused no picture is taken or given; then there is a key frame first.
+  void OfferPicturePause(std::shared_ptr<const PicturePause> state);
+
   /// InvalidArgument: `sequence` was never sent.
   absl::Status Acknowledge(std::uint64_t sequence, bool request_key_frame,
                            Timestamp now_ns = MonotonicNow());
 
   /// Fills the next event, if there is one and the window allows it. Kinds take turns, so that
   /// video cannot starve the map; a new subscriber has annotations and map before any picture.
+  /// Voice comes before everything, and has kVoiceBeyond events more than the window: who is behind
+  /// with pictures still hears.
   bool Next(Timestamp now_ns, EncodedEvent& event);
 
   /// True if the encoder should be asked for a key frame now (only while events may be sent).
@@ -81,6 +91,8 @@ class Subscription {
     kMap,
     kPresence,
     kGaze,
+    kPicturePause,
+    kChat,
     kPose,
     kVideo,
     kStatistics,
@@ -88,9 +100,12 @@ class Subscription {
     kEnd,
     kKinds
   };
+  static constexpr std::uint32_t kVoiceBeyond = 50;
 
   bool Has(v1::Topic topic) const { return options_.topics.test(static_cast<std::size_t>(topic)); }
-  bool WindowOpen() const { return sequence_ - acknowledged_ < options_.window; }
+  bool WindowOpen(std::uint32_t beyond = 0) const {
+    return sequence_ - acknowledged_ < options_.window + beyond;
+  }
   /// A field of an Event.
   struct Payload {
     int field;
@@ -102,6 +117,8 @@ class Subscription {
   std::optional<Payload> FillMap();
   std::optional<Payload> FillVideo(Timestamp now_ns);
   std::optional<Payload> FillPointers();
+  std::optional<Payload> FillChat();
+  std::optional<Payload> FillVoice();
 
   const SubscriptionOptions options_;
   const std::shared_ptr<EventBytes> bytes_;
@@ -126,9 +143,15 @@ class Subscription {
   std::optional<EngineStatistics> statistics_;
   std::optional<std::uint64_t> end_frames_;
   bool end_seen_ = false;
+  std::shared_ptr<const PicturePause> pause_;  // the newest; null: nobody said anything
+  bool pause_due_ = false;
+  std::shared_ptr<const ChatLog> chat_;  // null: none was offered
+  std::uint64_t chat_sent_ = 0;          // number
+  VoiceQueue voice_;
   std::uint64_t poses_skipped_ = 0;
 };
 
+v1::PicturePause PicturePauseToProto(const PicturePause& state);
 v1::StatisticsEvent StatisticsToProto(const EngineStatistics& statistics,
                                       std::uint64_t events_skipped);
 

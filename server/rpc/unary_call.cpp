@@ -52,7 +52,8 @@ UnaryCall::Reactor* UnaryCall::Finish(const absl::Status& status) const {
 void UnaryCall::Keep(const absl::Status& status) const {
   if (book_ == nullptr || RetryInfoOf(status)) return;
   if (!status.ok() && access_id_.empty()) return;
-  const std::string outcome = status.ok() ? "ok" : status.ToString().substr(0, kMaxOutcomeBytes);
+  const std::string outcome =
+      status.ok() ? outcome_ : status.ToString().substr(0, kMaxOutcomeBytes);
   book_->Record({0, participant_id_, display_name_, access_id_, "", method_, outcome});
 }
 

@@ -30,6 +30,8 @@ class UnaryCall {
       : context_(&context), reactor_(context.DefaultReactor()), method_(method), log_(log) {}
 
   void set_log(Log log) { log_ = log; }
+  /// What the audit says of it if it ends well.
+  void set_outcome(const std::string& outcome) { outcome_ = outcome; }
 
   // Admission (Gatekeeper); the log names whom it knows from then on.
   absl::StatusOr<Access> Enter(Gatekeeper& gate, std::optional<Toll> toll);
@@ -65,6 +67,7 @@ class UnaryCall {
   Reactor* reactor_;
   const char* method_;
   Log log_;
+  std::string outcome_ = "ok";
   AccessBook* book_ = nullptr;                             // from admission on
   std::string participant_id_, display_name_, access_id_;  // empty: not known
 };

@@ -65,6 +65,9 @@ class WearerTee final : public EventSink {
   void OnStatistics(const EngineStatistics& statistics) override { next_.OnStatistics(statistics); }
   void OnGaze(const std::shared_ptr<const GazeSnapshot>& state) override { next_.OnGaze(state); }
   void OnEndOfSource(std::uint64_t frames) override { next_.OnEndOfSource(frames); }
+  void OnPicturePause(const std::shared_ptr<const PicturePause>& state) override {
+    next_.OnPicturePause(state);
+  }
 
  private:
   EventSink& next_;

@@ -8,7 +8,10 @@ startPage(
     view: 'raw',
     name: 'wearer',
     // No video: the pictures are this phone's own.
-    topics: [Topic.POSE, Topic.ANNOTATION, Topic.PRESENCE, Topic.STATISTICS, Topic.GAZE],
+    topics: [
+      ...[Topic.POSE, Topic.ANNOTATION, Topic.PRESENCE, Topic.STATISTICS, Topic.GAZE],
+      ...[Topic.PICTURE_PAUSE, Topic.CHAT],
+    ],
   },
   (session, _player, token) => new WearApp(session, token),
 );

@@ -279,6 +279,36 @@ TEST_F(CommandLine, FilesThatCannotBeWrittenAreNamed) {
   ExpectFailure(Run({"snapshot", "--view", "raw", "--out", "/dev/full"}), "No space left");
 }
 
+TEST_F(CommandLine, TheWearerPausesThePictureAndLiftsIt) {
+  const std::string file = *folder_ / "paused.png";
+  const RunResult on = Run({"--name", "Ann", "pause-picture", "on"});
+  EXPECT_EQ(on.exit_code, 0) << on.err;
+  EXPECT_THAT(on.out, HasSubstr("paused by Ann since"));
+  ExpectFailure(Run({"snapshot", "--view", "raw", "--out", file}), "Ann has paused it");
+  ExpectFailure(Run({"snapshot", "--view", "augmented", "--out", file}), "Ann has paused it");
+  EXPECT_FALSE(std::filesystem::exists(file));
+  EXPECT_TRUE(RunJson({"status"})["picture_pause"]["paused"].get<bool>());
+  EXPECT_THAT(Run({"status"}).out, HasSubstr("paused by Ann since"));
+  EXPECT_FALSE(RunJson({"--name", "Bea", "pause-picture", "off"})["paused"].get<bool>());
+  EXPECT_FALSE(RunJson({"status"})["picture_pause"]["paused"].get<bool>());
+  EXPECT_EQ(Run({"pause-picture", "perhaps"}).exit_code, 2);
+}
+
+TEST_F(CommandLine, WhatIsSaidIsThereForOthers) {
+  const json mark = RunJson({"annotate", "--point", "0,0,1", "--text", "here"});
+  const std::string id = mark["id"];
+  const json said =
+      RunJson({"--name", "Ann", "say", "the left screw", "--annotation", id.substr(0, 10)});
+  EXPECT_EQ(said["annotation_id"], id);
+  EXPECT_EQ(said["display_name"], "Ann");
+  const RunResult read = Run({"--name", "Bea", "messages"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+  EXPECT_THAT(read.out, HasSubstr("Ann: the left screw  (mark " + id + ")"));
+  ExpectFailure(Run({"say", "nowhere", "--annotation", "zz"}), "there is no annotation 'zz'");
+  ExpectFailure(Run({"say", ""}), "text");
+  RunJson({"annotations", "delete", id});
+}
+
 TEST_F(CommandLine, GazeSaysThatThereIsNoMount) {
   ExpectFailure(Run({"fixate", "--point", "0,0,1"}), "no mount");
   ExpectFailure(Run({"home"}), "no mount");

@@ -111,6 +111,7 @@ InProcessServer::InProcessServer(const InProcessOptions& options) {
   std::unique_ptr<AnnotationStore> store;
   if (!options.data_dir.empty()) store = Must(AnnotationStore::Open(options.data_dir));
   EngineOptions engine_options;
+  engine_options.pictures = Must(PictureSwitch::Open(options.data_dir));
   engine_options.version = "test";
   engine_options.mailbox = options.mailbox;
   engine_options.mount = options.mount;

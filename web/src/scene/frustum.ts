@@ -32,14 +32,15 @@ export class Frustum {
     this.object.visible = false;
   }
 
-  /** Shows the picture now in the source canvas at the pose it was taken from. */
-  show(camera: Camera, worldFromCamera: Rigid3): void {
+  /** Shows the picture now in the source canvas at the pose it was taken from; or the camera alone. */
+  show(camera: Camera, worldFromCamera: Rigid3, picture: boolean): void {
     if (camera !== this.camera) this.build(camera);
     const p = threeFromWorld(worldFromCamera.translation);
     const q = threeOrientation(worldFromCamera);
     this.object.position.set(p.x, p.y, p.z);
     this.object.quaternion.set(q.x, q.y, q.z, q.w);
     this.texture.needsUpdate = true;
+    this.picture.visible = picture;
     this.object.visible = true;
   }
 

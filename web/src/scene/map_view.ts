@@ -31,6 +31,7 @@ export interface ShownFrame {
   readonly frameId: number;
   readonly camera: Camera;
   readonly worldFromCamera: Rigid3;
+  readonly picture: boolean; // false: where it is, without what it sees
 }
 
 /** The 3D map: features, the wearer's camera with its picture, its path. Marks go on top, in 2D. */
@@ -52,6 +53,7 @@ export class MapView {
   private lastMs = 0;
   private contentMs = -Infinity;
   private shownFrame = -1;
+  private shownPicture = false;
   private dirty = true;
 
   constructor(
@@ -149,9 +151,10 @@ export class MapView {
       if (this.frustum.object.visible) this.dirty = true;
       this.frustum.hide();
       this.shownFrame = -1;
-    } else if (shown.frameId !== this.shownFrame) {
+    } else if (shown.frameId !== this.shownFrame || shown.picture !== this.shownPicture) {
       this.shownFrame = shown.frameId;
-      this.frustum.show(shown.camera, shown.worldFromCamera);
+      this.shownPicture = shown.picture;
+      this.frustum.show(shown.camera, shown.worldFromCamera, shown.picture);
       this.dirty = true;
     }
   }

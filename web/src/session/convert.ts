@@ -162,6 +162,7 @@ export const toParticipant = (pb: PbParticipant): Participant => ({
   role: roles[pb.role],
   personId: pb.personId,
   colorRgba: pb.colorRgba,
+  listens: pb.listens,
 });
 
 export const toStatistics = (pb: StatisticsEvent): Statistics => ({

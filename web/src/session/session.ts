@@ -22,6 +22,7 @@ import { FrameRing } from './ring';
 import { silenceWords } from './silence';
 import { sleep } from './sleep';
 import type { Tabs } from './tabs';
+import { TalkState } from './talk_state';
 import type { FrameFacts, Link, Participant, Pose, Role, Scale, Statistics, View } from './types';
 
 export interface SessionOptions {
@@ -62,6 +63,7 @@ export class Session {
   readonly frames = new FrameRing<FrameFacts>(300);
   readonly path: Pose[] = [];
   readonly clock = new ClockOffset();
+  readonly talk = new TalkState();
   private readonly reader = new FrameReader();
   private heardMs = 0; // when the stream last told something; 0: not yet
   private lastEventMs = 0;
@@ -114,6 +116,14 @@ export class Session {
   rename(name: string): void {
     if (name === this.joining.name) return;
     this.joining.rename(name);
+    this.renamed = true;
+    this.attempt?.abort();
+  }
+
+  /** Whether this page hears voices: subscribes anew, in the same session. */
+  listen(listens: boolean): void {
+    if (this.talk.listens === listens) return;
+    this.talk.listens = listens;
     this.renamed = true;
     this.attempt?.abort();
   }
@@ -192,11 +202,12 @@ export class Session {
     ];
     try {
       void this.ping(signal);
+      void this.talk.catchUp(this.clients.talk, joined.sessionId, signal);
       const stream = this.clients.session.subscribe(
         {
           sessionId: joined.sessionId,
           window: WINDOW,
-          topics,
+          topics: this.talk.topics(topics),
           videoView: view === 'raw' ? VideoView.RAW : VideoView.AUGMENTED,
         },
         { signal },
@@ -270,7 +281,7 @@ export class Session {
         this.pointers.apply(event.value, this.participantId, this.lastEventMs);
         break;
       default:
-        break;
+        this.talk.receive(event);
     }
     this.acknowledger?.arrived(sequence);
   }

@@ -160,6 +160,8 @@ export interface Participant {
   readonly role: Role;
   readonly personId: string;
   readonly colorRgba: number; // the person's
+  /** Has joined the voices. */
+  readonly listens?: boolean;
 }
 
 /** The server's, over the last seconds. */

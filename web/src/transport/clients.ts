@@ -6,6 +6,7 @@ import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
 import { PointerService } from '../gen/saccade/v1/pointer_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
+import { TalkService } from '../gen/saccade/v1/talk_pb';
 
 export interface Clients {
   readonly session: Client<typeof SessionService>;
@@ -13,6 +14,7 @@ export interface Clients {
   readonly map: Client<typeof MapService>;
   readonly gaze: Client<typeof GazeService>;
   readonly pointers: Client<typeof PointerService>;
+  readonly talk: Client<typeof TalkService>;
 }
 
 /** gRPC-Web to the server that this page came from; `token` goes with each call, if there is one. */
@@ -25,5 +27,6 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
     map: createClient(MapService, transport),
     gaze: createClient(GazeService, transport),
     pointers: createClient(PointerService, transport),
+    talk: createClient(TalkService, transport),
   };
 }

@@ -12,6 +12,7 @@ import { AnnotationsPanel } from './annotations_panel';
 import { AppState } from './app_state';
 import { Controller } from './controller';
 import { h, setAttribute, setClass, storage } from './dom';
+import { FirstTask } from './first_task';
 import { GazeController } from './gaze_controller';
 import { GazePanel } from './gaze_panel';
 import { HandoverNotice } from './handover_notice';
@@ -35,6 +36,9 @@ import { whyNotEdit } from './rights';
 import { SelectedMarks } from './selected_marks';
 import { Sheets } from './sheets';
 import { Strip } from './strip';
+import { handleTalkKeys } from './talk_keys';
+import { TalkPanel } from './talk_panel';
+import { ToolNames } from './tool_names';
 import { ToolsColumn } from './tools_column';
 import { VideoPane } from './video_pane';
 
@@ -69,6 +73,8 @@ export class App {
   private readonly gaze: GazePanel;
   private readonly notice: HandoverNotice;
   private readonly hand: Hand;
+  private readonly talk: TalkPanel;
+  private readonly firstTask: FirstTask;
   private readonly stage = h('main', {});
   private mapLoading = false;
   private panelsMs = 0;
@@ -104,13 +110,23 @@ export class App {
     this.annotations = new AnnotationsPanel(session, state, controller, notes.editor.element);
     this.gaze = new GazePanel(session, this.pilot, state, gaze);
     this.notice = new HandoverNotice(session);
+    const lookHere = (id: string): void => {
+      state.selectedId = id;
+      this.map.lookAt(id);
+      state.changed();
+    };
+    this.talk = new TalkPanel(session, state, lookHere, () => this.showSheet());
+    this.firstTask = new FirstTask(session, this.map, this.video);
+    this.help.onFirstTask = () => this.firstTask.begin();
+    new ToolNames(this.tools.element);
     this.stage.append(this.map.element, this.video.element, this.notice.element);
+    this.stage.append(this.firstTask.element);
     this.element = h('div', { class: 'app' });
     this.element.append(
       this.header.element,
       this.tools.element,
       this.stage,
-      h('div', { class: 'side' }, this.annotations.element, this.gaze.element),
+      h('div', { class: 'side' }, this.annotations.element, this.gaze.element, this.talk.element),
       this.strip.element,
       this.sheets.element,
       this.help.dialog,
@@ -125,9 +141,15 @@ export class App {
     }
     handleKeys(controller, gaze, this.map, this.video, this.help, () => {
       state.sheet = 'marks';
-      this.element.dataset['sheet'] = 'marks'; // the field must be there to be given the keyboard
+      this.showSheet();
       this.annotations.bar.focus();
     });
+    handleTalkKeys(this.talk, this.help.dialog);
+  }
+
+  /** At once: a field must be there to be given the keyboard. */
+  private showSheet(): void {
+    this.element.dataset['sheet'] = this.state.sheet ?? '';
   }
 
   start(): void {
@@ -161,7 +183,7 @@ export class App {
     this.screen.add(nowMs);
     const { state, session, player } = this;
     setAttribute(this.stage, 'data-main', state.main);
-    setAttribute(this.element, 'data-sheet', state.sheet ?? '');
+    this.showSheet();
     if (player.draw()) {
       this.measure();
       this.element.dataset['firstPictureMs'] ??= performance.now().toFixed(0);
@@ -177,7 +199,7 @@ export class App {
     this.pilot.check();
     const version = [
       ...[state.version, session.annotations.changes, session.link.kind],
-      ...[this.pilot.version, gazeKey(session.gaze)],
+      ...[this.pilot.version, gazeKey(session.gaze), session.talk.version],
     ].join();
     if (version === this.panelsVersion && nowMs - this.panelsMs < PANEL_MS) return;
     this.panelsVersion = version;
@@ -190,7 +212,9 @@ export class App {
     this.element.dataset['overlayMs'] =
       `${median(this.video.overlayMs)} ${median(this.map.overlayMs)}`;
     this.annotations.update();
-    this.sheets.update(session.annotations.list().length);
+    this.sheets.update(session.annotations.list().length, this.talk.unread);
+    this.talk.update();
+    this.firstTask.update();
     this.gaze.update();
     setClass(this.element, 'no-head', !hasHead(session.gaze));
     if (hasHead(session.gaze)) this.pilot.warm();

@@ -16,7 +16,7 @@ export type Place =
 export type PaneName = 'map' | 'video';
 
 /** Panels that small windows show one at a time. */
-export type SheetName = 'marks' | 'gaze';
+export type SheetName = 'marks' | 'gaze' | 'talk';
 
 export interface Hover {
   readonly pane: PaneName;

@@ -67,7 +67,7 @@ export class Controller implements ToolActions, AnnotationActions {
         break;
       case 'freeze':
         if (video.frozen) video.thaw();
-        else if (!video.freeze()) state.refuse('freeze', 'There is no picture yet.');
+        else if (!video.freeze()) state.refuse('freeze', video.whyNoPicture);
         state.hover = undefined;
         break;
       case 'swap':

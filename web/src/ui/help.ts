@@ -2,6 +2,7 @@ import { COMMANDS, HEAD_COMMANDS, MARK_COMMANDS, TOOLS, TURNS } from '../tools/t
 import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { FeatureState } from '../session/types';
 import { h } from './dom';
+import { TALK_KEYS } from './talk_keys';
 
 const LEGEND: readonly [FeatureState, string, string][] = [
   ['measured', '●', 'measured in this picture'],
@@ -17,6 +18,8 @@ export class Help {
     '?',
   );
   readonly dialog: HTMLDialogElement;
+  /** Begins the first task once more. */
+  onFirstTask: (() => void) | undefined;
 
   constructor() {
     const keys = h('dl', {});
@@ -39,6 +42,9 @@ export class Help {
       h('dt', {}, h('kbd', {}, 'Esc'), 'Give up'),
       h('dd', {}, 'what is under way, then the tool, then the selection'),
     );
+    for (const { shown, label, hint } of TALK_KEYS) {
+      keys.append(h('dt', {}, h('kbd', {}, shown), label), h('dd', {}, hint));
+    }
     const legend = h('ul', { class: 'legend' });
     const explain = (colour: string, sign: string, words: string): void => {
       const mark = h('span', { class: 'sign' }, sign);
@@ -49,6 +55,11 @@ export class Help {
     explain(TARGET_CSS, '◎', 'what the camera is to look at; its ring is solid once it is held');
     const close = h('button', { type: 'button' }, 'Close');
     close.addEventListener('click', () => this.dialog.close());
+    const task = h('button', { type: 'button' }, 'Show the first task');
+    task.addEventListener('click', () => {
+      this.dialog.close();
+      this.onFirstTask?.();
+    });
     this.dialog = h(
       'dialog',
       { 'aria-label': 'Help' },
@@ -62,6 +73,7 @@ export class Help {
         {},
         'Drag to orbit, right-drag or Shift-drag to pan, wheel to zoom; on a touch screen one finger, two fingers, pinch. With the map focused: arrow keys orbit, plus and minus zoom, Enter clicks in the middle. With the video focused: arrow keys move the place that Enter clicks at. Tools that are pressed and moved are held from one Enter to the next.',
       ),
+      task,
       close,
     );
     this.button.addEventListener('click', () => this.toggle());

@@ -1,11 +1,13 @@
+import { Camera } from '../geometry/camera';
 import type { Pixel } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
 import { lineOfSight } from '../scene/gaze_sight';
-import type { MapView } from '../scene/map_view';
+import type { MapView, ShownFrame } from '../scene/map_view';
 import { pageNowMs } from '../session/clock';
+import { toIntrinsics } from '../session/convert';
 import { gazeKey } from '../session/gaze';
 import type { Session } from '../session/session';
-import { isPlaced } from '../session/types';
+import { isPlaced, type Pose } from '../session/types';
 import type { AppState } from './app_state';
 import { h } from './dom';
 import { Pane } from './pane';
@@ -17,6 +19,7 @@ export class MapPane extends Pane {
   map: MapView | undefined; // arrives after the video: three.js is the larger part of the page
   private readonly canvas: HTMLCanvasElement;
   private drawnKey = '';
+  private lens: Camera | undefined; // as pictures come
 
   constructor(session: Session, player: Player, state: AppState, pictures: PictureCache) {
     const canvas = h('canvas', { class: 'map' });
@@ -39,10 +42,19 @@ export class MapPane extends Pane {
     return this.map?.view();
   }
 
+  /** Turns the view to a mark, as near as it is now. */
+  lookAt(annotationId: string): void {
+    const at = this.session.annotations.get(annotationId)?.anchor.pointInWorld;
+    if (!at || !this.map) return;
+    this.map.following = false;
+    this.map.orbit.follow(at);
+    this.map.hold();
+  }
+
   /** Where the wearer's camera appears, in CSS pixels of this pane. */
   cameraAt(): Pixel | undefined {
     const view = this.view();
-    const pose = this.player.shown?.facts.pose;
+    const pose = this.pose;
     return view && isPlaced(pose)
       ? projectPoint(view, pose.worldFromCamera.translation)
       : undefined;
@@ -70,14 +82,7 @@ export class MapPane extends Pane {
     if (!map) return;
     map.resize(width, height);
     map.pictureIntervalMs = screenFps > 0 && screenFps < 45 ? 150 : 0;
-    const shown = this.player.shown?.facts;
-    const pose = shown?.pose;
-    const moved = map.draw(
-      nowMs,
-      shown && isPlaced(pose)
-        ? { frameId: shown.frameId, camera: shown.camera, worldFromCamera: pose.worldFromCamera }
-        : undefined,
-    );
+    const moved = map.draw(nowMs, this.eye());
     const { version } = this.session.annotations;
     const gaze = gazeKey(this.session.gaze);
     this.session.pointers.list(pageNowMs()); // forgets those that are silent
@@ -87,6 +92,25 @@ export class MapPane extends Pane {
     const begin = performance.now();
     this.drawOver(map.view(), width, height);
     this.took(performance.now() - begin);
+  }
+
+  /** Of the picture shown; while there is none to be shown, the newest. */
+  private get pose(): Pose | undefined {
+    const { session, player } = this;
+    return session.talk.pause ? session.pose : player.shown?.facts.pose;
+  }
+
+  /** The wearer's camera where it is to be drawn, with its picture or, while that is paused, without. */
+  private eye(): ShownFrame | undefined {
+    const { pose, session } = this;
+    const facts = this.player.shown?.facts;
+    this.lens = facts?.camera ?? this.lens;
+    const pb = session.joined?.intrinsics;
+    if (!this.lens && session.talk.pause && pb) this.lens = new Camera(toIntrinsics(pb));
+    const camera = this.lens;
+    if (!camera || !isPlaced(pose)) return undefined;
+    const { frameId, worldFromCamera } = pose;
+    return { frameId, camera, worldFromCamera, picture: facts !== undefined };
   }
 
   private drawOver(view: View, width: number, height: number): void {
@@ -102,7 +126,7 @@ export class MapPane extends Pane {
   /** The target, and the line to it from the camera as it is in the picture shown. */
   private drawSight(view: View): void {
     const target = this.session.gaze?.targetInWorld;
-    const pose = this.player.shown?.facts.pose;
+    const pose = this.pose;
     if (target && isPlaced(pose)) {
       this.painter.lineOfSight(lineOfSight(view, pose.worldFromCamera.translation, target));
     }

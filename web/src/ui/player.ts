@@ -60,6 +60,10 @@ export class Player implements PictureSink {
   /** Draws the newest picture; true if there was a new one. */
   draw(): boolean {
     const { next, context } = this;
+    if (this.session?.talk.pause) {
+      this.clear();
+      return false;
+    }
     if (!next || !context) return false;
     this.next = undefined;
     const facts = this.session?.frames.get(next.frame.timestamp);
@@ -77,5 +81,16 @@ export class Player implements PictureSink {
     this.canvas.dataset['frameId'] = String(facts.frameId);
     this.rate.add(drawnMs);
     return true;
+  }
+
+  /** Nothing of what was shown stays on the canvas. */
+  private clear(): void {
+    const { next, shown, canvas } = this;
+    next?.frame.close();
+    this.next = undefined;
+    if (!shown) return;
+    this.shown = undefined;
+    this.context?.clearRect(0, 0, canvas.width, canvas.height);
+    canvas.dataset['frameId'] = '';
   }
 }

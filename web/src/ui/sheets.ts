@@ -9,6 +9,7 @@ export class Sheets {
   constructor(private readonly state: AppState) {
     this.add('marks', 'Marks');
     this.add('gaze', 'Gaze');
+    this.add('talk', 'Talk');
   }
 
   private add(name: SheetName, words: string): void {
@@ -21,11 +22,12 @@ export class Sheets {
     this.element.append(button);
   }
 
-  update(marks: number): void {
+  update(marks: number, unread: number): void {
     for (const [name, button] of this.buttons) {
       button.setAttribute('aria-expanded', String(this.state.sheet === name));
     }
-    const button = this.buttons.get('marks');
-    if (button) setText(button, `Marks ${marks}`);
+    const [list, talk] = [this.buttons.get('marks'), this.buttons.get('talk')];
+    if (list) setText(list, `Marks ${marks}`);
+    if (talk) setText(talk, unread > 0 ? `Talk ${unread}` : 'Talk');
   }
 }

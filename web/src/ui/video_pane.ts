@@ -13,7 +13,7 @@ import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
 import { save, takeSnapshot } from './snapshot';
 import { Still } from './still';
-import { crowdedWords, lostWords } from './words';
+import { crowdedWords, lostWords, pauseWords } from './words';
 
 const STALE_MS = 1000;
 
@@ -64,7 +64,7 @@ export class VideoPane extends Pane {
   /** Keeps the picture on the screen with its marks as a file. */
   async snapshot(takenBy: string): Promise<void> {
     const current = this.current();
-    if (!current) throw new Error('there is no picture yet');
+    if (!current) throw new Error(this.whyNoPicture);
     const { session, state, player, still } = this;
     const marks = this.sameMap ? this.marks() : [];
     const annotations = session.annotations.list().filter((each) => state.draws(each));
@@ -184,6 +184,12 @@ export class VideoPane extends Pane {
     return facts?.pose?.mapRevision === this.session.pose?.mapRevision;
   }
 
+  /** Why it cannot be frozen or kept. */
+  get whyNoPicture(): string {
+    const { pause } = this.session.talk;
+    return pause ? `${pauseWords(pause)}.` : 'There is no picture yet.';
+  }
+
   private updateNote(): void {
     const { player, state, session, still } = this;
     const refusal = state.refusal('video');
@@ -197,7 +203,8 @@ export class VideoPane extends Pane {
     else if (still) {
       text = `frozen, ${((nowMs - still.sinceMs) / 1000).toFixed(0)} s: P goes on`;
       if (!this.sameMap) text += '. The map has changed since: marks are not where they were';
-    } else if (player.shown && stale) text = `picture is ${(age / 1000).toFixed(0)} s old`;
+    } else if (session.talk.pause) text = pauseWords(session.talk.pause);
+    else if (player.shown && stale) text = `picture is ${(age / 1000).toFixed(0)} s old`;
     else if (!player.shown && session.live) text = 'waiting for the first picture';
     else if (player.shown) {
       this.darkness.look(player.canvas, nowMs);
@@ -206,5 +213,6 @@ export class VideoPane extends Pane {
     }
     this.setNote(text);
     this.element.classList.toggle('stale', stale && !still);
+    this.element.classList.toggle('paused', session.talk.pause !== undefined);
   }
 }

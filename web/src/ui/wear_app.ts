@@ -20,6 +20,7 @@ import { WEAR_STAGES, WearMeter, wearTimes } from '../uplink/wear_latency';
 import { storage } from './dom';
 import { allMarks } from './marks';
 import { Painter } from './painter';
+import { PauseControl } from './pause_control';
 import { WearScreen } from './wear_screen';
 import { latencyWords, wearWords } from './wear_words';
 import { presenceWords, statusWords } from './words';
@@ -33,6 +34,7 @@ export class WearApp {
   private readonly screen = new WearScreen();
   private readonly painter = new Painter();
   private readonly camera: WearCamera;
+  private readonly pause: PauseControl;
   private uplink: Uplink | undefined;
   private intrinsics: CameraIntrinsics | undefined;
   private next: { tracked: WearerTracked; arrivedMs: number } | undefined;
@@ -51,10 +53,8 @@ export class WearApp {
     this.element = this.screen.element;
     this.screen.picture.after(this.painter.canvas);
     this.screen.start.addEventListener('click', () => void this.begin());
-    this.screen.pause.addEventListener('click', () => {
-      this.camera.paused = !this.camera.paused;
-      this.camera.requestKeyFrame();
-    });
+    this.pause = new PauseControl(session);
+    this.screen.pause.addEventListener('click', () => this.pause.toggle());
     this.screen.lens.addEventListener('change', () => {
       this.camera.deviceId = this.screen.lens.value;
       void this.openCamera();
@@ -186,8 +186,8 @@ export class WearApp {
       link,
       uplink: uplink?.state,
       camera: camera.state,
-      paused: camera.paused,
-      problem: uplink?.problem ?? '',
+      paused: this.pause.paused,
+      problem: this.pause.problem || (uplink?.problem ?? ''),
       untrackedMs: nowMs - this.trackedMs,
       tracking: {
         text: [`${status.mark} ${status.text}`, status.advice].filter(Boolean).join(': '),
@@ -201,7 +201,7 @@ export class WearApp {
       started: this.started && camera.state.kind !== 'failed',
       refused: link.kind === 'refused' || uplink?.state.kind === 'refused',
       failure: camera.state.kind === 'failed' ? camera.state.reason : '',
-      paused: camera.paused,
+      paused: this.pause.paused,
       watchers: session.live
         ? presenceWords(session.participants.filter(({ role }) => role !== 'wearer')) ||
           'nobody watches'

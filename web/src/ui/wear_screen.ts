@@ -92,8 +92,9 @@ export class WearScreen {
     setClass(this.intro, 'hidden', started || refused);
     setClass(this.bar, 'hidden', !started);
     setClass(this.lens, 'hidden', this.lens.options.length < 2);
-    setText(this.pause, paused ? '▶ Go on' : 'Ⅱ Pause');
+    setText(this.pause, paused ? '▶ Go on' : 'Ⅱ Pause picture');
     setText(this.latency, latency);
-    setClass(this.element, 'stale', paused || refused);
+    setClass(this.element, 'stale', refused);
+    setClass(this.element, 'paused', paused);
   }
 }

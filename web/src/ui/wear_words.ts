@@ -36,8 +36,8 @@ export function wearWords(input: WearInput): WearWords {
   if (uplink.kind === 'reconnecting') {
     return warn(`reconnecting, ${spanWords(nowMs - uplink.sinceMs)}: ${uplink.reason}`);
   }
-  if (paused) return warn('paused: experts see the last picture');
   if (problem) return warn(problem);
+  if (paused) return warn('picture paused: nobody sees the camera; the map stays live');
   if (untrackedMs > QUIET_MS) return warn('sending; the server tracks nothing yet');
   return tracking;
 }

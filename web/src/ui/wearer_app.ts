@@ -1,61 +1,113 @@
 import { pageNowMs } from '../session/clock';
 import { hasHead } from '../session/gaze';
 import type { Session } from '../session/session';
+import { VoiceRoom } from '../talk/voice_room';
+import { Chime } from './chime';
 import { h, isComposing, setClass, setText } from './dom';
+import { NewsWatch } from './news';
+import { PauseControl } from './pause_control';
 import type { Player } from './player';
+import { SpokenPause } from './spoken_pause';
 import { WearerHead } from './wearer_head';
-import { presenceWords, statusWords } from './words';
+import { clockWords, statusWords } from './words';
 
 const STALE_MS = 1000;
+const NEWS_MS = 1500; // how long news is lit
 
-/** The wearer's view: the augmented picture, one line of words, a large pause. */
+const button = (className: string, title: string): HTMLButtonElement =>
+  h('button', { type: 'button', class: className, title });
+
+/**
+ * The wearer's view: the augmented picture with its marks, one line of what was said last, who watches
+ * and who steers, one large pause for everybody's picture and a smaller one for the head.
+ */
 export class WearerApp {
   readonly element: HTMLElement;
   private readonly mark = h('span', { class: 'mark', 'aria-hidden': 'true' });
   private readonly words = h('span', {});
   private readonly line = h('p', { class: 'line', role: 'status' }, this.mark, this.words);
   private readonly watchers = h('p', { class: 'watchers' });
-  private readonly pauseButton = h('button', { type: 'button', class: 'pause', title: 'P' });
-  private readonly head: WearerHead;
-  private readonly fullButton = h('button', { type: 'button', class: 'full' }, 'Full screen');
+  private readonly news = h('p', { class: 'news', role: 'status', dir: 'auto' });
   private readonly notice = h('p', { class: 'notice', role: 'alert' });
-  private paused = false;
+  private readonly pauseButton = button('pause', 'P');
+  private readonly pausedWords = h('p', { class: 'paused-words', role: 'status' });
+  private readonly fullButton = button('small full', 'F');
+  private readonly soundButton = button('small sound', 'S');
+  private readonly spokenButton = button('small spoken', 'say “pause picture” or “go on”');
+  private readonly voiceButton = button('small voice', 'V');
+  private readonly muteButton = button('small mute', 'M');
+  private readonly head: WearerHead;
+  private readonly pause: PauseControl;
+  private readonly chime = new Chime();
+  private readonly watch: NewsWatch;
+  private readonly spoken: SpokenPause;
+  private readonly room: VoiceRoom;
 
   constructor(
     private readonly session: Session,
     private readonly player: Player,
   ) {
     this.head = new WearerHead(session);
+    this.pause = new PauseControl(session);
+    this.spoken = new SpokenPause((paused) => this.pause.set(paused));
+    this.watch = new NewsWatch(session, () => this.chime.play());
+    this.room = new VoiceRoom(session);
+    const small = h('div', { class: 'small-row' });
+    small.append(this.voiceButton, this.muteButton, this.soundButton);
+    if (SpokenPause.supported) small.append(this.spokenButton);
+    small.append(this.fullButton);
+    const head = h('div', { class: 'head-row' }, this.head.stop, this.head.take);
     this.element = h(
-      'div',
+      'main',
       { class: 'wearer-view' },
       player.canvas,
-      this.line,
-      this.watchers,
+      h('div', { class: 'top' }, this.line, this.watchers),
+      this.pausedWords,
       this.notice,
-      h('div', { class: 'buttons' }, this.head.stop, this.pauseButton, this.head.take),
-      this.fullButton,
+      h('div', { class: 'bottom' }, this.news, this.pauseButton, head, small),
     );
-    this.pauseButton.addEventListener('click', () => this.togglePause());
+    this.pauseButton.addEventListener('click', () => this.pause.toggle());
     this.fullButton.addEventListener('click', () => this.toggleFull());
-    document.addEventListener('keydown', (event) => {
-      // No key that also presses a button: what a press does is done once.
-      if (event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
-      if (isComposing(event)) return;
-      const key = event.key.toLowerCase();
-      if (key === 'p') this.togglePause();
-      if (key === 'f') this.toggleFull();
-      if (key === 'x') this.head.toggleStop();
-    });
+    this.soundButton.addEventListener('click', () => this.chime.toggle());
+    this.spokenButton.addEventListener('click', () => this.spoken.toggle());
+    this.voiceButton.addEventListener('click', () => this.toggleVoice());
+    this.muteButton.addEventListener('click', () => this.room.toggleMute());
+    document.addEventListener('keydown', (event) => this.key(event));
   }
 
   start(): void {
     requestAnimationFrame(() => this.frame());
   }
 
-  private togglePause(): void {
-    this.paused = !this.paused;
-    this.update();
+  /** No key that also presses a button: what a press does is done once. */
+  private key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
+    if (isComposing(event)) return;
+    switch (event.key.toLowerCase()) {
+      case 'p':
+        this.pause.toggle();
+        break;
+      case 'f':
+        this.toggleFull();
+        break;
+      case 'x':
+        this.head.toggleStop();
+        break;
+      case 's':
+        this.chime.toggle();
+        break;
+      case 'v':
+        this.toggleVoice();
+        break;
+      case 'm':
+        this.room.toggleMute();
+        break;
+    }
+  }
+
+  private toggleVoice(): void {
+    if (this.room.state === 'off') void this.room.join();
+    else this.room.leave();
   }
 
   private toggleFull(): void {
@@ -65,40 +117,77 @@ export class WearerApp {
 
   private frame(): void {
     requestAnimationFrame(() => this.frame());
-    if (!this.paused) this.player.draw();
+    this.player.draw();
+    this.watch.update();
     this.update();
   }
 
   private update(): void {
-    const { session, player, paused } = this;
+    const { session, player, pause } = this;
     const { link, pose, poseMs, sourceEnded } = session;
     const words = statusWords({ link, pose, poseMs, sourceEnded, nowMs: pageNowMs() });
-    const text = [words.text, words.advice].filter(Boolean).join(': ');
+    const { paused } = pause;
     const age = player.shown ? pageNowMs() - player.shown.drawnMs : 0;
     const stale = age > STALE_MS && !paused && !sourceEnded;
-    // While the picture is live it has its status burned in: one line is enough.
-    const burnedIn = link.kind === 'live' && player.shown && !paused && !stale && !sourceEnded;
-    setClass(this.line, 'hidden', burnedIn === true);
-    setText(this.mark, paused ? 'Ⅱ' : words.mark);
-    // Nothing reaches the camera from here yet: say what a pause is, and what it is not.
-    setText(this.words, paused ? 'picture held here; experts still see the camera' : text);
-    setClass(this.line, 'warn', words.warn || paused);
-    setText(this.watchers, session.live ? watcherWords(session) : '');
+    // That all is well is no news: then there is nothing but the marks.
+    const well = link.kind === 'live' && words.text === 'tracking good' && !stale;
+    setClass(this.line, 'hidden', well);
+    setText(this.mark, words.mark);
+    setText(this.words, [words.text, words.advice].filter(Boolean).join(': '));
+    setClass(this.line, 'warn', words.warn);
+    setText(this.watchers, session.live ? watcherWords(session, this.room) : '');
     setText(this.pauseButton, paused ? '▶ Go on' : 'Ⅱ Pause picture');
-    setText(this.fullButton, document.fullscreenElement ? 'Leave full screen' : 'Full screen');
+    this.pauseButton.setAttribute('aria-pressed', String(paused));
+    setText(this.pausedWords, paused ? pausedText(session) : '');
+    setClass(this.element, 'paused', paused);
+    const { newest } = this.watch;
+    setText(this.news, newest?.text ?? '');
+    setClass(this.news, 'lit', newest !== undefined && performance.now() - newest.atMs < NEWS_MS);
+    this.updateSmall();
     this.head.update();
-    setText(this.notice, this.head.problem || noticeWords(player, stale ? age : 0));
+    const problems = [pause.problem, this.head.problem, this.room.problem, this.spoken.problem];
+    const problem = problems.find((text) => text !== '');
+    setText(this.notice, problem ?? noticeWords(player, stale ? age : 0));
     setClass(this.element, 'stale', stale);
+    this.element.dataset['heard'] = this.room.figures;
+    this.element.dataset['chimes'] = String(this.chime.count);
+  }
+
+  private updateSmall(): void {
+    const { room, chime, spoken } = this;
+    const open = room.state !== 'off';
+    setText(this.voiceButton, open ? 'Leave voice' : 'Join voice');
+    this.voiceButton.setAttribute('aria-pressed', String(open));
+    setClass(this.muteButton, 'hidden', !room.hasMicrophone);
+    setText(this.muteButton, room.muted ? 'Unmute' : 'Mute');
+    this.muteButton.setAttribute('aria-pressed', String(room.muted));
+    setText(this.soundButton, chime.muted ? 'Sound is off' : 'Sound is on');
+    this.soundButton.setAttribute('aria-pressed', String(!chime.muted));
+    setText(this.spokenButton, spoken.listening ? 'Listens for “pause”' : 'Pause by voice');
+    this.spokenButton.setAttribute('aria-pressed', String(spoken.listening));
+    setText(this.fullButton, document.fullscreenElement ? 'Leave full screen' : 'Full screen');
   }
 }
 
-function watcherWords({ participants, gaze, participantId }: Session): string {
-  const others = presenceWords(participants.filter(({ role }) => role !== 'wearer'));
-  const watching = others ? `${others} watching` : 'nobody watches';
+function pausedText({ talk }: Session): string {
+  const since = talk.pause ? ` since ${clockWords(talk.pause.sinceMs)}` : '';
+  return `Picture paused${since}. Nobody sees the camera; the map stays live.`;
+}
+
+/** "Ann, Bea watch · Ann steers"; a name that is lit speaks. */
+function watcherWords({ participants, gaze, participantId }: Session, room: VoiceRoom): string {
+  const others = participants.filter((each) => each.role !== 'wearer');
+  const names = others.map((each) =>
+    room.speaks(each.participantId) ? `🔊 ${each.name}` : each.name,
+  );
+  const watching =
+    names.length === 0
+      ? 'nobody watches'
+      : `${names.join(', ')} ${names.length === 1 ? 'watches' : 'watch'}`;
   if (!hasHead(gaze)) return watching;
   if (gaze.paused) return `${watching} · head stopped`;
   if (!gaze.pilot) return watching;
-  return `${watching} · ${gaze.pilot.participantId === participantId ? 'you pilot' : `${gaze.pilot.name} pilots`}`;
+  return `${watching} · ${gaze.pilot.participantId === participantId ? 'you steer' : `${gaze.pilot.name} steers`}`;
 }
 
 function noticeWords(player: Player, staleMs: number): string {

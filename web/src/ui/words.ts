@@ -1,5 +1,6 @@
 import { spanWords } from '../session/silence';
 import { MAX_STREAMS } from '../session/tabs';
+import type { PicturePause } from '../session/talk_state';
 import {
   type Annotation,
   doNotTrust,
@@ -122,6 +123,14 @@ export function lostWords(pose: Pose | undefined): string {
   const { text, advice } = trackingWords(pose);
   return `${text === 'lost' ? 'Lost' : 'Searching its place'}: ${advice}. Marks come back with it`;
 }
+
+/** "Ann paused the picture at 12:03; the map stays live". */
+export const pauseWords = ({ by, sinceMs }: PicturePause): string =>
+  `${by || 'The wearer'} paused the picture at ${clockWords(sinceMs)}; the map stays live`;
+
+/** "12:03", where this browser is. */
+export const clockWords = (unixMs: number): string =>
+  new Date(unixMs).toLocaleTimeString([], { hour: '2-digit', minute: '2-digit', hour12: false });
 
 /** "1 frame", "2 frames". */
 export const counted = (count: number, thing: string): string =>

@@ -17,7 +17,6 @@ export type CameraState =
 /** The phone's camera to the server: opened, coded, sent, and opened again when it was taken away. */
 export class WearCamera {
   state: CameraState = { kind: 'off' };
-  paused = false;
   deviceId = '';
   readonly sent = new SentRing(RING);
   readonly held: Record<Held, number> = { encoder: 0, network: 0, server: 0 };
@@ -92,7 +91,7 @@ export class WearCamera {
 
   private handle(frame: VideoFrame, capturedMs: number): void {
     const uplink = this.uplink();
-    if (this.paused || !uplink?.live || !this.taken) return;
+    if (!uplink?.live || !this.taken) return;
     // Cameras give what they have: more than is taken is not coded.
     if (capturedMs - this.takenMs < 800 / this.fps) return;
     const why = held(

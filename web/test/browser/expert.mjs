@@ -35,7 +35,8 @@ function withoutPriority(executablePath, folder, prefix) {
 export class Expert {
   /**
    * `home`: whose certificates count; `prefix`: a command that runs the browser elsewhere; `flags`: more of
-   * the browser's; `viewport`: of the page; `nameless`: who sits there is asked for a name.
+   * the browser's; `viewport`: of the page; `nameless`: who sits there is asked for a name;
+   * `firstTime`: the page offers its first task; `init`: runs in the page before anything of its own.
    */
   static async open(
     executablePath,
@@ -46,6 +47,8 @@ export class Expert {
       flags = [],
       viewport = { width: 1280, height: 720 },
       nameless = false,
+      firstTime = false,
+      init,
     } = {},
   ) {
     const profile = mkdtempSync(join(tmpdir(), 'saccade-browser-'));
@@ -54,9 +57,15 @@ export class Expert {
       args: [...FLAGS, ...flags],
       env: { ...process.env, HOME: home },
       viewport,
+      bypassCSP: init !== undefined, // else what `init` loads would be refused
     });
+    if (init) await context.addInitScript(init);
     const page = context.pages()[0] ?? (await context.newPage());
     const expert = new Expert(context, page, profile);
+    // Somebody who has been here before: no first task in the way.
+    if (!firstTime) {
+      await context.addInitScript(() => localStorage.setItem('saccade.firstTask', 'done'));
+    }
     page.on('pageerror', (error) => expert.errors.push(error.message));
     const address = new URL(url);
     if (!nameless && !address.searchParams.has('name')) address.searchParams.set('name', 'expert');

@@ -15,6 +15,7 @@ const SIZES = [
   { name: 'wide', width: 3440, height: 1440, touch: false },
 ];
 const FINGER_PX = 44;
+const PANELS = { marks: 'aside', gaze: 'section.gaze', talk: 'section.talk' };
 
 export async function runLayout({ server: binary, chromium, seed, shots, folder }) {
   const server = await startServer(binary, [
@@ -69,9 +70,9 @@ async function atSize(context, size) {
   context.check(`${name} ${width} x ${height}, words and tools`, await faults(page, size));
   context.check(`${name}, axe`, await barriers(page));
   if (shots) await page.screenshot({ path: join(shots, `layout-${name}.png`) });
-  for (const sheet of ['marks', 'gaze']) {
+  for (const [sheet, where] of Object.entries(PANELS)) {
     const button = page.locator(`button[data-sheet="${sheet}"]`);
-    const panel = page.locator(sheet === 'marks' ? 'aside' : 'section.gaze');
+    const panel = page.locator(where);
     if (!(await button.isVisible())) {
       context.check(
         `${name}, ${sheet} beside the picture`,

@@ -287,6 +287,8 @@ async function buttons(context) {
     paused && held && fast === 'true',
     `head ${paused ? 'stopped' : 'moves again'}, picture ${held ? 'held' : 'goes on'}, fast ${fast}`,
   );
+  await wearer.getByRole('button', { name: 'Go on' }).click(); // it was paused for everybody
+  await wearer.getByRole('button', { name: 'Pause picture' }).waitFor({ timeout: 5000 });
   await go.click();
   await wearer.close();
 }

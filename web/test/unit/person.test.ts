@@ -60,6 +60,7 @@ describe('rename', () => {
         ping: () => Promise.reject(new Error('not here')),
         acknowledge: () => Promise.resolve({}),
       },
+      talk: { listMessages: () => Promise.resolve({ messages: [] }) },
     } as unknown as Clients;
     session = new Session(clients, options, pictures);
     const stop = new AbortController();

@@ -109,6 +109,7 @@ describe('a session', () => {
         ping: () => Promise.reject(new Error('not here')),
         acknowledge: () => Promise.resolve({}),
       },
+      talk: { listMessages: () => Promise.resolve({ messages: [] }) },
     } as unknown as Clients;
     return { clients, asked, end: (error: Error) => end(error) };
   };

@@ -59,6 +59,10 @@ class ListBackend final : public Backend {
   void SetPresence(std::shared_ptr<const ParticipantSet>) override {}
   void SetVideoDemand(VideoView, bool) override {}
   void RequestKeyFrame(VideoView) override {}
+  void PausePicture(bool, std::string, Done<PicturePause> done) override { done(PicturePause()); }
+  std::shared_ptr<const PicturePause> picture_pause() const override {
+    return std::make_shared<const PicturePause>();
+  }
 
   absl::Status Submit(Command command) override {
     if (auto* create = std::get_if<CreateAnnotation>(&command)) {

@@ -41,6 +41,10 @@ class Rest : public Backend {
   void SetVideoDemand(VideoView, bool) override {}
   void SetPresence(std::shared_ptr<const ParticipantSet>) override {}
   void RequestKeyFrame(VideoView) override { ++key_frames_asked; }
+  void PausePicture(bool, std::string, Done<PicturePause> done) override { done(PicturePause()); }
+  std::shared_ptr<const PicturePause> picture_pause() const override {
+    return std::make_shared<const PicturePause>();
+  }
 
   std::atomic<int> key_frames_asked = 0;
 
