@@ -23,6 +23,7 @@ struct Session {
   std::string display_name;
   v1::Role role = v1::ROLE_EXPERT;
   std::string access_id;  // of the token that joined (Access::id); no other may use the session
+  std::string invite_id;  // of whom that token came (Access::invite_id)
 };
 
 /// One line that goes into others' lists and into the log. InvalidArgument: too long, or it holds a
@@ -31,7 +32,8 @@ absl::Status CheckDisplayName(const std::string& name);
 
 struct SessionTableOptions {
   std::size_t max_sessions = 1000;
-  std::size_t max_sessions_of_token = 32;  // 0: no limit; where there are no tokens there is none
+  std::size_t max_sessions_of_token = 32;    // 0: no limit; where there are no tokens there is none
+  std::size_t max_sessions_of_invite = 128;  // of all that came by one invite together; likewise
   // Where the table is full, these make room, and only these: who works is never put out by who
   // joins.
   Timestamp unused_ns = 5'000'000'000;  // joined so long ago, and never heard of again
@@ -81,7 +83,8 @@ class SessionTable {
     int holds = 0;
   };
   bool MakeRoom(Timestamp now_ns);
-  absl::Status CheckToken(const std::string& access_id, Timestamp now_ns);
+  absl::Status CheckOwn(std::string Session::*owner, const std::string& id, std::size_t most,
+                        Timestamp now_ns);
   void Release(const std::string& session_id);
   void TellGone();
 

@@ -48,6 +48,8 @@ const std::vector<Home>& Homes() {
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},
       {"openssl/", {"server/identity", "client/net"}},
+      {"cjose/", {"server/identity"}},
+      {"curl/", {"server/identity"}},
       {"qrencode.h", {"shared/io"}},
       {"wels/", {"server/encode"}},
       {"GL/osmesa.h", {"server/gl"}},

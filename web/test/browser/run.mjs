@@ -1,10 +1,11 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze|dots|person|invite|layout|wear|waiting]   (gaze: the turning of the head; dots: measured features
+//        [--part page|gaze|dots|person|invite|layout|wear|waiting|oidc]   (gaze: the turning of the head; dots: measured features
 //        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
 //        from another address than loopback where this may make a network namespace; wear: a phone as the
 //        camera, and an expert, each in a network of its own; layout: sizes of
-//        window and barriers; waiting: who comes waits to be let in; page: everything else)
+//        window and barriers; waiting: who comes waits to be let in; oidc: a firm's
+//        people sign in; page: everything else)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -46,6 +47,7 @@ const PARTS = {
   layout: async () => (await import('./layout.mjs')).runLayout,
   wear: async () => (await import('./wear.mjs')).runWear,
   waiting: async () => (await import('./waiting.mjs')).runWaiting,
+  oidc: async () => (await import('./oidc.mjs')).runOidc,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);
 const runChecks = await PARTS[options.part]();
