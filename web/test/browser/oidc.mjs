@@ -66,7 +66,7 @@ async function signIn({ server: binary, chromium, seed, shots, folder }, algorit
     check('who has no invite is offered to sign in', true, await refused(ada, /invite/));
     await shoot(ada, 'offer');
     await logIn(ada, button, 'ada', provider);
-    await ada.waitForStatus(/^tracking/, 60_000);
+    await ada.waitForStatus(/^tracking/, 120_000);
     await shoot(ada, 'in');
     const address = ada.page.url();
     check('who signed in sees the camera', true, `tracking, at ${address}`);
@@ -85,7 +85,7 @@ async function signIn({ server: binary, chromium, seed, shots, folder }, algorit
       JSON.stringify(joined),
     );
     await ada.page.reload();
-    await ada.waitForStatus(/^tracking/, 60_000);
+    await ada.waitForStatus(/^tracking/, 120_000);
     check('a reload needs no second sign-in', true, 'tracking again');
     const codes = provider.asked.filter((line) => line === 'POST /token').length;
     check('one code was taken to the provider', codes === 1, `${codes}`);
@@ -106,7 +106,7 @@ async function signIn({ server: binary, chromium, seed, shots, folder }, algorit
     await victim.page.goto('about:blank');
     await bob.page.goto('about:blank');
     await ada.page.goto(server.http);
-    await ada.waitForStatus(/^tracking/, 60_000);
+    await ada.waitForStatus(/^tracking/, 120_000);
     await provider.rotate();
     const out = watchForRefusal(ada);
     const beganMs = Date.now();
@@ -120,7 +120,7 @@ async function signIn({ server: binary, chromium, seed, shots, folder }, algorit
     console.log(`      ${saccade('revoke', row.id, '--undo').trim()}`);
     await ada.page.waitForTimeout(5200); // keys are fetched anew no more often
     await logIn(ada, button, 'ada', provider);
-    await ada.waitForStatus(/^tracking/, 60_000);
+    await ada.waitForStatus(/^tracking/, 120_000);
     check('until that is undone; with the new key of the provider', true, 'tracking');
 
     await ada.page.goto('about:blank');
