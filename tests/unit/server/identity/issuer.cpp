@@ -100,7 +100,8 @@ void Issuer::Serve(int socket) {
   {
     const std::lock_guard guard(mutex_);
     ++asked_[path];
-    last_body_ = request.substr(std::min(request.size(), request.find("\r\n\r\n") + 4));
+    const std::string body = request.substr(std::min(request.size(), request.find("\r\n\r\n") + 4));
+    if (!body.empty()) last_body_ = body;
     if (const auto found = replies_.find(path); found != replies_.end()) reply = found->second;
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(reply.delay_ms));

@@ -26,7 +26,7 @@ class Issuer {
   void Set(const std::string& path, Reply reply);
   /// The discovery document, with these fields instead of the usual ones.
   void SetDiscovery(const std::map<std::string, std::string>& changes = {});
-  /// How often a path was asked for, and the last request's body.
+  /// How often a path was asked for, and the last body that was sent.
   int asked(const std::string& path) const;
   std::string last_body() const;
 

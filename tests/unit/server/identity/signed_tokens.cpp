@@ -50,7 +50,11 @@ std::string SigningKey::Sign(const nlohmann::json& claims, const nlohmann::json&
   }
   for (const auto& [name, value] : header.items()) {
     if (value.is_null()) continue;  // left out
-    cjose_header_set_raw(protect, name.c_str(), value.dump().c_str(), &error);
+    if (value.is_string()) {
+      cjose_header_set(protect, name.c_str(), value.get<std::string>().c_str(), &error);
+    } else {
+      cjose_header_set_raw(protect, name.c_str(), value.dump().c_str(), &error);
+    }
   }
   const std::string text = claims.dump();
   cjose_jws_t* jws = cjose_jws_sign(
