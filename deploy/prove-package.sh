@@ -78,6 +78,8 @@ prove_install_and_serve() {
   check_not "nothing listens beyond loopback" within sh -c 'ss -Hltn | grep -v "127.0.0.1:"'
   check "the page is served" within sh -c 'curl -fs http://127.0.0.1:8080/ | grep -qi "<html"'
   check "state is its own alone" within sh -c '[ "$(stat -c %U:%a /var/lib/saccade)" = saccade:700 ]'
+  check "its file is root's, and the service's to read" within sh -c '[ "$(stat -c %U:%G:%a /etc/saccade/saccade.toml)" = root:saccade:640 ]'
+  check "its account has no shell and no password" within sh -c 'getent passwd saccade | grep -q "nologin$" && getent shadow saccade | cut -d: -f2 | grep -q "^[!*]"'
   check "a mark can be placed" within saccade annotate --point 0.1,0.1,1.5 --shape arrow --text kept
   within systemd-analyze --no-pager verify /usr/lib/systemd/system/saccade.service 2>&1 | sed 's/^/  verify: /'
   within systemd-analyze --no-pager security saccade 2>&1 | tail -1
@@ -113,6 +115,9 @@ prove_tls() {
   link=$(within "${owner[@]}" invite --role pilot | grep -o 'https://[^ ]*' | head -1)
   check "an invite is made (${link%%#*})" test -n "$link"
   # Once: it lets one in, and the pass is kept.
+  check "keys, invites and marks are its own alone" within sh -c '[ -s /var/lib/saccade/access.sqlite ] && [ -z "$(find /var/lib/saccade -mindepth 1 -perm /077)" ]'
+  check_not "another account reads no token" within runuser -u nobody -- cat /var/lib/saccade/owner.json
+  check_not "nor stops the service" within runuser -u nobody -- pkill saccade-server
   check "who has it comes in" within env HOME=/tmp/guest saccade --tls --trust /tmp/root.pem --invite "$link" status
   check "and sees what is tracked" wait_for 30 within env HOME=/tmp/guest sh -c 'saccade --json status | grep -q "\"status\": \"tracking\""'
 }
@@ -150,6 +155,17 @@ prove_upgrade_and_removal() {
   check_not "the user is gone" within getent passwd saccade
 }
 
+# Somebody called saccade works on this machine: the service does not become that person.
+prove_foreign_account() {
+  within useradd --create-home saccade
+  if apt_within install --no-install-recommends ./opt/saccade.deb; then miss "it took a person's account"; fi
+  check "a person's account is refused, in words" grep -q 'there is an account named saccade that is not' "$root.apt.log"
+  check_not "nothing runs as that person" within pgrep -u saccade
+  apt_within purge saccade || miss "what was refused cannot be purged"
+  check "the person is still there" within sh -c 'getent passwd saccade | grep -q /home/saccade && [ -d /home/saccade ]'
+  within userdel -r saccade || true
+}
+
 prove_package() {
   local deb=${1:-}
   command -v systemd-nspawn >/dev/null || fail "systemd-nspawn is missing: apt-get install systemd-container"
@@ -175,6 +191,7 @@ prove_package() {
   prove_sandbox
   prove_tls
   prove_upgrade_and_removal
+  prove_foreign_account
   power_off
   leader=
   [ $failures = 0 ] || fail "$failures of it failed; logs: $root.*.log"

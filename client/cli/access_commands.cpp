@@ -54,7 +54,8 @@ CLI::Validator Life() {
 
 std::string StateOf(const net::Invite& invite) {
   if (invite.revoked) return "revoked";
-  if (std::time(nullptr) >= invite.expires_unix_s) return "expired";
+  if (std::time(nullptr) >= invite.expires_unix_s) return invite.person ? "signed out" : "expired";
+  if (invite.person) return "signed in";
   return invite.used >= invite.uses ? "used up" : "open";
 }
 
@@ -65,6 +66,7 @@ nlohmann::json ToJson(const net::Invite& invite) {
           {"created_unix_s", invite.created_unix_s},
           {"expires_unix_s", invite.expires_unix_s},
           {"waiting_room", invite.waiting_room},
+          {"person", invite.person},
           {"uses", invite.uses},
           {"used", invite.used},
           {"state", StateOf(invite)}};
@@ -136,18 +138,21 @@ absl::Status RunInvites(const Options& options, net::AccessClient& client) {
   std::vector<std::vector<std::string>> rows = {{"id", "role", "state", "used", "until", "label"}};
   for (const net::Invite& invite : *invites) {
     rows.push_back({invite.id, invite.role, StateOf(invite),
-                    absl::StrCat(invite.used, " of ", invite.uses), TimeText(invite.expires_unix_s),
-                    invite.label});
+                    invite.person ? absl::StrCat(invite.used, " times")
+                                  : absl::StrCat(invite.used, " of ", invite.uses),
+                    TimeText(invite.expires_unix_s), invite.label});
   }
   std::cout << (invites->empty() ? "no invites\n" : Table(rows));
   return absl::OkStatus();
 }
 
 absl::Status RunRevoke(const Options& options, net::AccessClient& client) {
-  const absl::StatusOr<int> ended = client.Revoke(options.id);
+  const absl::StatusOr<int> ended = client.Revoke(options.id, options.undo);
   if (!ended.ok()) return ended.status();
   if (options.json) {
     std::cout << Dump({{"id", options.id}, {"passes", *ended}}) << "\n";
+  } else if (options.undo) {
+    std::cout << absl::StrFormat("%s may sign in again\n", options.id);
   } else {
     std::cout << absl::StrFormat("%s is revoked; %d pass%s ended with it\n", options.id, *ended,
                                  *ended == 1 ? "" : "es");
@@ -192,6 +197,10 @@ void AddAccess(CLI::App& app, Options& options) {
       ->excludes(tls);
   app.add_option("--invite", options.invite,
                  "Link or token that lets you in; its pass is kept for later runs");
+  app.add_option("--id-token", options.id_token_file,
+                 "File (-: standard input) with an ID token of your firm's provider, instead of an "
+                 "invite; the pass is kept for later runs")
+      ->excludes("--invite");
   app.add_option("--data-dir", options.data_dir,
                  "Of the server on this machine (trust, invite, invites, revoke)");
   CLI::App* root = app.add_subcommand("trust", "Export the root of a server's own authority (PEM)");
@@ -218,8 +227,10 @@ void AddAccess(CLI::App& app, Options& options) {
   audit->add_option("--most", options.most, "So many of the newest")
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str();
-  CLI::App* revoke = app.add_subcommand("revoke", "End an invite, and throw out who came in by it");
+  CLI::App* revoke = app.add_subcommand(
+      "revoke", "End an invite or a person's sign-in, and throw out who came in by it");
   revoke->add_option("id", options.id, "Its id, as `saccade invites` shows it")->required();
+  revoke->add_flag("--undo", options.undo, "Of a person who signs in: let them sign in again");
 }
 
 bool IsAccessCommand(Command command) {

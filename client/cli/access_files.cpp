@@ -1,11 +1,13 @@
 #include "client/cli/access_files.hpp"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <iostream>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
@@ -64,6 +66,25 @@ bool IsLoopback(const std::string& server) {
          absl::StartsWith(server, "localhost:");
 }
 
+// Not on the command line, which every account of the machine sees.
+absl::StatusOr<std::string> ReadIdToken(const std::string& file) {
+  std::string text;
+  if (file == "-") {
+    text.resize(kMaxFileBytes);
+    std::cin.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(std::cin.gcount()));
+  } else {
+    absl::StatusOr<std::string> read = ReadRegularFile(file, kMaxFileBytes, "an ID token");
+    if (!read.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("--id-token: ", read.status().message()));
+    }
+    text = *std::move(read);
+  }
+  const absl::string_view token = absl::StripAsciiWhitespace(text);
+  if (token.empty()) return absl::InvalidArgumentError("--id-token: there is no token in it");
+  return std::string(token);
+}
+
 void Apply(KeptAccess kept, net::ConnectionOptions& to) {
   to.tls = kept.tls;
   to.root_pem = std::move(kept.root_pem);
@@ -118,10 +139,16 @@ absl::Status ResolveAccess(Options& options) {
     to.tls = true;
     to.root_pem = *std::move(root);
   }
-  if (options.invite.empty()) return absl::OkStatus();
+  if (options.invite.empty() && options.id_token_file.empty()) return absl::OkStatus();
   to.token.clear();
-  const absl::StatusOr<net::Pass> pass =
-      net::AccessClient(to).Redeem(options.invite, to.display_name);
+  absl::StatusOr<net::Pass> pass = absl::InternalError("");
+  if (options.id_token_file.empty()) {
+    pass = net::AccessClient(to).Redeem(options.invite, to.display_name);
+  } else {
+    const absl::StatusOr<std::string> token = ReadIdToken(options.id_token_file);
+    if (!token.ok()) return token.status();
+    pass = net::AccessClient(to).RedeemIdToken(*token);
+  }
   if (!pass.ok()) return pass.status();
   to.token = pass->token;
   return Keep({to.server, to.tls, to.root_pem, to.token, ""});

@@ -73,6 +73,7 @@ struct Options {
   std::string trust;  // PEM file; empty: the system's store
   bool tls = false, plain = false;
   std::string invite;         // link or token to redeem
+  std::string id_token_file;  // likewise; "-": standard input
   std::string data_dir;       // of a server on this machine; empty: its default
   std::string from;           // trust: HOST:PORT of its page; empty: data_dir
   bool fingerprint = false;   // trust: that alone
@@ -81,6 +82,7 @@ struct Options {
   std::uint32_t most = 1000;  // audit
   std::uint32_t uses = 1;     // invite
   bool waiting_room = false;  // invite: who comes by it waits
+  bool undo = false;          // revoke
   bool refuse = false;        // admit: sends them away instead
   std::string text;           // say
   bool follow = false;        // messages

@@ -42,7 +42,8 @@ Invite FromProto(const v1::Invite& message) {
           message.uses(),
           message.used(),
           message.revoked(),
-          message.waiting_room()};
+          message.waiting_room(),
+          message.person()};
 }
 
 Waiting FromProto(const v1::WaitingPerson& message) {
@@ -70,6 +71,13 @@ class AccessClient::Impl {
     return response;
   }
 
+  absl::StatusOr<Pass> Redeem(const v1::RedeemRequest& request) {
+    const auto response = Call(&v1::AccessService::Stub::Redeem, request);
+    if (!response.ok()) return response.status();
+    return Pass{response->token(), WordOf(response->role()), response->expires_unix_s(),
+                response->waiting()};
+  }
+
  private:
   const ConnectionOptions options_;
   const std::unique_ptr<v1::AccessService::Stub> stub_;
@@ -86,10 +94,13 @@ absl::StatusOr<Pass> AccessClient::Redeem(const std::string& invite,
   const std::size_t at = invite.find(kMark);
   request.set_invite(at == std::string::npos ? invite : invite.substr(at + kMark.size()));
   request.set_display_name(display_name);
-  const auto response = impl_->Call(&v1::AccessService::Stub::Redeem, request);
-  if (!response.ok()) return response.status();
-  return Pass{response->token(), WordOf(response->role()), response->expires_unix_s(),
-              response->waiting()};
+  return impl_->Redeem(request);
+}
+
+absl::StatusOr<Pass> AccessClient::RedeemIdToken(const std::string& id_token) {
+  v1::RedeemRequest request;
+  request.set_id_token(id_token);
+  return impl_->Redeem(request);
 }
 
 absl::StatusOr<bool> AccessClient::Waits() {
@@ -139,9 +150,10 @@ absl::StatusOr<Waiting> AccessClient::Admit(const std::string& id, bool refuse) 
   return FromProto(response->person());
 }
 
-absl::StatusOr<int> AccessClient::Revoke(const std::string& id) {
+absl::StatusOr<int> AccessClient::Revoke(const std::string& id, bool undo) {
   v1::RevokeInviteRequest request;
   request.set_id(id);
+  request.set_undo(undo);
   const auto response = impl_->Call(&v1::AccessService::Stub::RevokeInvite, request);
   if (!response.ok()) return response.status();
   return static_cast<int>(response->passes());

@@ -19,6 +19,7 @@ struct Invite {
   std::uint32_t uses = 1, used = 0;
   bool revoked = false;
   bool waiting_room = false;
+  bool person = false;  // no link, but somebody who signs in with their firm; `label` is their name
 };
 struct NewInvite {
   Invite invite;
@@ -53,6 +54,8 @@ class AccessClient {
   absl::StatusOr<Pass> Redeem(const std::string& invite, const std::string& display_name = "");
   /// True while the holder of the token waits to be let in.
   absl::StatusOr<bool> Waits();
+  /// The same with an ID token of the firm's provider, which the server takes once.
+  absl::StatusOr<Pass> RedeemIdToken(const std::string& id_token);
   // With the owner's token. `life_s` and `uses` 0: as the server has them.
   absl::StatusOr<NewInvite> Create(const std::string& role, std::uint32_t life_s,
                                    std::uint32_t uses, const std::string& label,
@@ -61,8 +64,8 @@ class AccessClient {
   absl::StatusOr<std::vector<Waiting>> WaitingRoom();
   /// Lets somebody in, or ends their pass.
   absl::StatusOr<Waiting> Admit(const std::string& id, bool refuse);
-  /// How many passes ended with it.
-  absl::StatusOr<int> Revoke(const std::string& id);
+  /// How many passes ended with it. `undo`: of a person, who may sign in again.
+  absl::StatusOr<int> Revoke(const std::string& id, bool undo = false);
   /// The newest `most` (1 to 10000; 0: 1000), oldest first.
   absl::StatusOr<std::vector<AuditEntry>> Audit(std::uint32_t most);
 

@@ -13,6 +13,9 @@ find_package(Ceres REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(OpenSSL 3 REQUIRED)
 find_package(PkgConfig REQUIRED)
+# What firms' providers sign (OIDC), and asking them over HTTP.
+pkg_check_modules(Cjose REQUIRED IMPORTED_TARGET cjose)
+pkg_check_modules(Curl REQUIRED IMPORTED_TARGET libcurl)
 pkg_check_modules(OpenH264 REQUIRED IMPORTED_TARGET openh264)
 # saccade-client alone. libimgui.a holds its backends for GLFW and OpenGL 3, which loads OpenGL itself.
 find_package(glfw3 3.3 REQUIRED)

@@ -21,6 +21,8 @@ TrafficLimits TrafficOf(const LimitSettings& limits) {
           .address_requests = RateOf(limits, limits.address_requests_per_s),
           .token_bytes = RateOf(limits, limits.bytes_per_s),
           .address_bytes = RateOf(limits, limits.address_bytes_per_s),
+          .invite_requests = RateOf(limits, limits.invite_requests_per_s),
+          .invite_bytes = RateOf(limits, limits.invite_bytes_per_s),
           .this_machine = limits.this_machine};
 }
 
@@ -29,6 +31,7 @@ ConnectionLimits ConnectionsOf(const ServerConfig& config) {
   const bool counted = limits.scale > 0;
   return {.all = limits.connections,
           .of_address = counted ? limits.address_connections : 0,
+          .of_network = counted ? limits.network_connections : 0,
           .unheard_of_address = counted ? limits.address_unheard : 0,
           .new_of_address = RateOf(limits, limits.address_connections_per_s),
           .this_machine = limits.this_machine,
@@ -49,6 +52,8 @@ void ApplyLimits(const ServerConfig& config, RpcServerOptions& options) {
   options.trusted_proxy = options.connections.trusted_proxy;
   options.sessions.max_sessions_of_token =
       config.limits.scale > 0 ? static_cast<std::size_t>(config.limits.sessions) : 0;
+  options.sessions.max_sessions_of_invite =
+      config.limits.scale > 0 ? static_cast<std::size_t>(config.limits.invite_sessions) : 0;
 }
 
 void ApplyLimits(const ServerConfig& config, RpcServer& rpc, GatewayOptions& options) {

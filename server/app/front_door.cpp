@@ -116,6 +116,7 @@ absl::StatusOr<std::unique_ptr<FrontDoor>> FrontDoor::Open(const ServerConfig& c
     // Of a run that was killed: it would tell `saccade` of a server that is no more.
     ::unlink((config.data_dir / "owner.json").c_str());
   }
+  if (config.oidc) door->provider_ = std::make_unique<IdentityProvider>(*config.oidc);
   return door;
 }
 
@@ -141,7 +142,18 @@ void FrontDoor::Watch(OnNew on_new) {
   });
 }
 
+// Once a day, as logs are read by people.
+void FrontDoor::SayExpiry() {
+  const std::int64_t now_unix_s = NowUnix_s(), day = now_unix_s / 86'400;
+  if (!identity_ || day == said_day_) return;
+  const std::string warning = ExpiryWarning(*identity_, now_unix_s);
+  if (warning.empty()) return;
+  said_day_ = day;
+  Log(warning);
+}
+
 void FrontDoor::Look(const OnNew& on_new) {
+  SayExpiry();
   const absl::StatusOr<ServerIdentity> now = Identify();
   const bool same = now.ok() && now->chain_pem == served_chain_;
   absl::Status status = now.status();
@@ -157,7 +169,16 @@ void FrontDoor::Look(const OnNew& on_new) {
   if (same) return;
   served_chain_ = now->chain_pem;
   SayNotNamed(*now);
+  const bool other_root = now->root_pem != identity_->root_pem;
+  identity_ = *now;
   Log("tls: who connects from now on sees the new certificate");
+  if (!other_root) return;
+  Log(absl::StrCat("tls: of a new authority: everybody has to trust it anew: ", base_url_,
+                   "/trust, fingerprint ", identity_->root_sha256));
+  if (!wrote_owner_) return;
+  if (absl::Status written = WriteOwner(); !written.ok()) {
+    Log(absl::StrCat("saccade on this machine cannot connect: ", written.message()));
+  }
 }
 
 FrontDoor::~FrontDoor() {
@@ -199,22 +220,27 @@ absl::Status FrontDoor::Announce(int grpc_port, int http_port) {
     Log(absl::StrCat("waiting for the phone: open ", base_url_, WearerPath(), " on it"));
   }
   if (!config_.auth_required) return absl::OkStatus();
+  owner_grpc_ = LocalAddress(config_.grpc, grpc_port);
+  if (absl::Status written = WriteOwner(); !written.ok()) return written;
+  wrote_owner_ = true;
+  SayExpiry();
+  SayInvites();
+  return absl::OkStatus();
+}
+
+absl::Status FrontDoor::WriteOwner() const {
   // A given certificate has no name like 127.0.0.1; whom it is by is the system's store to say, or
   // --trust.
   const bool given = identity_ && !config_.tls_certificate.empty();
-  const std::string root = !identity_ ? "" : given ? "" : identity_->root_pem;
-  const nlohmann::json owner = {{"grpc", LocalAddress(config_.grpc, grpc_port)},
+  const std::string root = !identity_ || given ? "" : identity_->root_pem;
+  const nlohmann::json owner = {{"grpc", owner_grpc_},
                                 {"tls", config_.WantsTls(config_.grpc)},
                                 {"root", root},
                                 {"name", given ? GivenName(*identity_) : ""},
                                 {"token", access_->owner_token()}};
   const std::filesystem::path file = config_.data_dir / "owner.json";
-  if (const int failed = WritePrivateFile(file, owner.dump() + "\n"); failed != 0) {
-    return StoreFileError(file, failed);
-  }
-  wrote_owner_ = true;
-  SayInvites();
-  return absl::OkStatus();
+  const int failed = WritePrivateFile(file, owner.dump() + "\n");
+  return failed == 0 ? absl::OkStatus() : StoreFileError(file, failed);
 }
 
 void FrontDoor::SayInvites() {
@@ -230,6 +256,10 @@ void FrontDoor::SayInvites() {
   }
   Log(absl::StrCat("invites: `saccade invite --role pilot --data-dir ", config_.data_dir.string(),
                    "` makes a link"));
+  if (config_.oidc) {
+    Log(absl::StrCat("oidc: who signs in with ", config_.oidc->issuer,
+                     " comes in; it has to know the redirect URI ", base_url_, "/"));
+  }
   if (::isatty(STDERR_FILENO) == 0) return;
   const InviteDraft pilot{AccessRole::kPilot, kConsoleLife_s, 1, "console", false};
   const InviteDraft wearer{AccessRole::kWearer, kConsoleLife_s, 1, "console", false};

@@ -12,6 +12,7 @@
 #include "server/app/server_config.hpp"
 #include "server/identity/access_book.hpp"
 #include "server/identity/certificate_files.hpp"
+#include "server/identity/identity_provider.hpp"
 
 namespace saccade {
 
@@ -36,6 +37,8 @@ class FrontDoor {
   /// Nothing: `address` speaks plain.
   std::optional<ServerIdentity> TlsOf(const Address& address) const;
   AccessBook& access() { return *access_; }
+  /// Null: nobody signs in.
+  IdentityProvider* provider() { return provider_.get(); }
   bool insecure() const;  // plain beyond loopback
   /// Names that browsers may use besides the machine's own.
   const std::vector<std::string>& allowed_hosts() const { return allowed_hosts_; }
@@ -51,17 +54,22 @@ class FrontDoor {
   std::string BaseUrl(int http_port) const;
   absl::StatusOr<ServerIdentity> Identify() const;
   void Look(const OnNew& on_new);
+  void SayExpiry();
+  absl::Status WriteOwner() const;
   void SayInvites();
   const char* WearerPath() const;  // of the page that is theirs
 
   const ServerConfig config_;
   std::optional<ServerIdentity> identity_;
   std::unique_ptr<AccessBook> access_;
+  std::unique_ptr<IdentityProvider> provider_;
   std::vector<std::string> allowed_hosts_;
   std::string base_url_;  // before the first call is served
   bool wrote_owner_ = false;
-  std::string served_chain_;  // of the watch, once it runs
-  std::string said_;          // the last trouble with a certificate
+  std::string served_chain_;   // of the watch, once it runs
+  std::string said_;           // the last trouble with a certificate
+  std::int64_t said_day_ = 0;  // on which the end of one was told
+  std::string owner_grpc_;     // where this machine reaches the server
   std::jthread watch_;
 };
 

@@ -16,12 +16,17 @@ struct LimitSettings {
   double requests_per_s = 500;
   double bytes_per_s = 8e6;
   int sessions = 32;
+  // Of everybody who came by one invite.
+  double invite_requests_per_s = 2000;
+  double invite_bytes_per_s = 32e6;
+  int invite_sessions = 128;
   // Of an address, where its callers have no pass or use much of theirs.
   double address_requests_per_s = 2000;
   double address_bytes_per_s = 32e6;
   double address_connections_per_s = 50;
   int address_connections = 256;
   int address_unheard = 64;
+  int network_connections = 512;
   bool this_machine = false;
   // Of everybody together.
   int connections = 1024;

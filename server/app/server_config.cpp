@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/app/oidc_settings.hpp"
 #include "server/encode/video_encoder.hpp"
 #include "server/gaze/gaze_options.hpp"
 #include "server/mount/drivers/drivers.hpp"
@@ -150,8 +151,9 @@ std::string DefaultFile() {
   }
   absl::StrAppend(&text, "\n[video]\n");
   add("bit_rate_bit_s = 0", BitRateWords());
-  absl::StrAppend(&text, "\n", LimitSettings::Describe(), "\n", TrackerOptions::Describe(), "\n",
-                  GazeOptions::Describe(), "\n", MountDrivers().Describe());
+  absl::StrAppend(&text, "\n", LimitSettings::Describe(), "\n", DescribeOidc(), "\n",
+                  TrackerOptions::Describe(), "\n", GazeOptions::Describe(), "\n",
+                  MountDrivers().Describe());
   return text;
 }
 
@@ -218,8 +220,8 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
       }
       left.erase("client_roles");
     }
-    // Read by TrackerOptions, GazeOptions, LimitSettings and the mounts.
-    for (const char* table : {"tracker", "gaze", "limits"}) left.erase(table);
+    // Read by TrackerOptions, GazeOptions, LimitSettings, LoadOidc and the mounts.
+    for (const char* table : {"tracker", "gaze", "limits", "oidc"}) left.erase(table);
     for (const std::string& table : MountDrivers().Tables()) left.erase(table);
     if (!left.empty()) return Bad(absl::StrCat(raw.config, ": unknown key ", *left.begin()));
   } catch (const std::exception& error) {
@@ -337,6 +339,12 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   config.video_bit_rate_bit_s = static_cast<int>(raw.bit_rate);
   if (!raw.config.empty()) {
     if (absl::Status limits = config.limits.LoadToml(raw.config); !limits.ok()) return limits;
+    auto oidc = LoadOidc(raw.config);
+    if (!oidc.ok()) return oidc.status();
+    if (oidc->has_value() && !config.auth_required) {
+      return Bad("oidc: nobody needs to sign in where no invites are asked for: set auth.required");
+    }
+    config.oidc = *std::move(oidc);
   }
   config.web_root = raw.web_root;
   if (raw.seed < 0) return Bad(absl::StrCat("seed: ", raw.seed, ": give a whole number from 0"));

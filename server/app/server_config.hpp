@@ -11,6 +11,7 @@
 #include "server/app/limit_settings.hpp"
 #include "server/gl/gl_context.hpp"
 #include "server/identity/access.hpp"
+#include "server/identity/identity_provider.hpp"
 
 namespace saccade {
 
@@ -38,6 +39,7 @@ struct ServerConfig {
   bool tls_required = false;                       // on loopback, too
   std::filesystem::path client_ca;                 // who vouches for machines; empty: nobody
   std::map<std::string, AccessRole> client_roles;  // [client_roles], by common name or URI
+  std::optional<IdentityProviderOptions> oidc;     // [oidc]: with whom people sign in
   bool waiting_room = false;                       // who comes by an invite waits to be let in
   bool auth_required = false;  // calls need a token: asked for, or beyond loopback and not insecure
   std::string public_url;      // without a slash at its end; empty: found out

@@ -117,6 +117,7 @@ absl::Status InvalidCa(absl::string_view why) {
 
 absl::Status LetIn(FrontDoor& door, const ServerConfig& config, RpcServerOptions& options) {
   options.access = &door.access();
+  options.provider = door.provider();
   options.insecure = door.insecure();
   options.make_link = [&door](AccessRole role, const std::string& token) {
     return door.LinkOf(role, token);
@@ -137,7 +138,10 @@ absl::Status LetIn(FrontDoor& door, const ServerConfig& config, RpcServerOptions
 absl::Status Renew(const ServerIdentity& renewed, const ServerConfig& config, RpcServer& rpc,
                    Gateway& gateway) {
   absl::Status status;
-  if (config.WantsTls(config.http)) status = gateway.SetTls(renewed.chain_pem, renewed.key_pem);
+  if (config.WantsTls(config.http)) {
+    status =
+        gateway.SetTls(renewed.chain_pem, renewed.key_pem, renewed.root_pem, renewed.root_sha256);
+  }
   // Also where the other port could not.
   if (config.WantsTls(config.grpc)) {
     status.Update(rpc.SetTls({renewed.chain_pem, renewed.key_pem}));

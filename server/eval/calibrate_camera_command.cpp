@@ -24,6 +24,7 @@ namespace {
 constexpr Timestamp kSilence_ns = 2'000'000'000;
 
 absl::StatusOr<std::unique_ptr<FrameSource>> Open(const CalibrateArguments& arguments) {
+  if (absl::Status phone = RefusePhone(arguments.source); !phone.ok()) return phone;
   const absl::StatusOr<FrameRange> range = ParseFrameRange(arguments.frames);
   if (!range.ok()) return range.status();
   SourceOptions options;

@@ -79,6 +79,8 @@ absl::Status RecordCommand(const RenderArguments& arguments);
 absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments);
 /// Whether the source is paced by the world, and ends when somebody ends it.
 bool IsLive(absl::string_view uri);
+/// InvalidArgument with the remedy: `uri` is a phone's, which only a server receives.
+absl::Status RefusePhone(absl::string_view uri);
 /// Optimises a pose graph in g2o's form and prints its cost before and after.
 absl::Status PoseGraphCommand(const PoseGraphArguments& arguments);
 

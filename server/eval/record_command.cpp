@@ -16,7 +16,16 @@ bool IsLive(absl::string_view uri) {
   return absl::StartsWith(uri, "v4l2:") || absl::StartsWith(uri, "rtsp:");
 }
 
+absl::Status RefusePhone(absl::string_view uri) {
+  if (!absl::StartsWith(uri, "phone:")) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "--source phone: a phone's browser sends its pictures to a saccade-server alone, and this "
+      "program is none; film with the phone's own camera, copy the video here, and give "
+      "--source file:VIDEO");
+}
+
 absl::Status RecordCommand(const RenderArguments& arguments) {
+  if (absl::Status phone = RefusePhone(arguments.source); !phone.ok()) return phone;
   if (absl::StartsWith(arguments.source, "sim:")) return RecordSimulator(arguments);
   const absl::StatusOr<FrameRange> range = ParseFrameRange(arguments.frames);
   if (!range.ok()) return range.status();

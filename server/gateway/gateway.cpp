@@ -110,10 +110,16 @@ class Gateway::Impl {
 
   int port() const { return port_; }
 
-  absl::Status SetTls(const std::string& chain_pem, const std::string& key_pem) {
+  absl::Status SetTls(const std::string& chain_pem, const std::string& key_pem,
+                      const std::string& root_pem, const std::string& root_sha256) {
     absl::StatusOr<Tls> tls = MakeTls(chain_pem, key_pem);
     if (!tls.ok()) return tls.status();
-    net::post(io_, [this, tls = *std::move(tls)] { context_.tls = tls; });
+    net::post(io_, [this, tls = *std::move(tls), root_pem, root_sha256] {
+      context_.tls = tls;
+      if (root_pem.empty() || root_pem == options_.root_pem) return;
+      options_.root_pem = root_pem;
+      AddTrustPage(root_pem, root_sha256, context_.files);
+    });
     return absl::OkStatus();
   }
 
@@ -208,8 +214,11 @@ class Gateway::Impl {
     absl::Status status = gate_.Hurry(peer, now_ns);
     if (status.ok() && gate_.Counts(peer)) {
       ConnectionCounts counts;
+      const std::string network = NetworkKey(peer);
       for (const auto& [raw, weak] : connections_) {
-        if (PeerKey(raw->peer()) != peer) continue;
+        const std::string other = PeerKey(raw->peer());
+        if (NetworkKey(other) == network) ++counts.of_network;
+        if (other != peer) continue;
         ++counts.of_address;
         if (!raw->heard()) ++counts.unheard_of_address;
       }
@@ -262,8 +271,9 @@ Gateway::Gateway(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Gateway::~Gateway() { Stop(); }
 int Gateway::port() const { return impl_->port(); }
 void Gateway::Stop() { impl_->Stop(); }
-absl::Status Gateway::SetTls(const std::string& chain_pem, const std::string& key_pem) {
-  return impl_->SetTls(chain_pem, key_pem);
+absl::Status Gateway::SetTls(const std::string& chain_pem, const std::string& key_pem,
+                             const std::string& root_pem, const std::string& root_sha256) {
+  return impl_->SetTls(chain_pem, key_pem, root_pem, root_sha256);
 }
 
 }  // namespace saccade

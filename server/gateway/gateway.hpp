@@ -90,9 +90,11 @@ class Gateway {
   /// The port bound.
   int port() const;
 
-  /// Another certificate and key for who connects from now on; who is connected stays. Only where
-  /// TLS is spoken. InvalidArgument: they cannot be used, and nothing changes.
-  absl::Status SetTls(const std::string& chain_pem, const std::string& key_pem);
+  /// Another certificate and key for who connects from now on, and the root that is to be trusted
+  /// (as GatewayOptions has it); who is connected stays. Only where TLS is spoken.
+  /// InvalidArgument: they cannot be used, and nothing changes.
+  absl::Status SetTls(const std::string& chain_pem, const std::string& key_pem,
+                      const std::string& root_pem = "", const std::string& root_sha256 = "");
 
   /// Cancels what is under way, closes every connection, joins the thread. May be called twice.
   void Stop();

@@ -110,6 +110,9 @@ absl::StatusOr<StaticFiles> StaticFiles::Load(const std::filesystem::path& root)
 void StaticFiles::Put(const std::string& path, std::string body, absl::string_view content_type) {
   StaticFile file = MakeFile(std::move(body), "", /*immutable=*/false);
   file.content_type = std::string(content_type);
+  if (const auto before = files_.find(path); before != files_.end()) {
+    replaced_.push_back(std::move(before->second));  // its buffers stay where they are
+  }
   files_[path] = std::move(file);
 }
 

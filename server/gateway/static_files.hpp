@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <list>
 #include <map>
 #include <string>
 
@@ -33,13 +34,15 @@ class StaticFiles {
   /// Null if there is none.
   const StaticFile* Find(absl::string_view target) const;
 
-  /// Puts one that is not on the disk at `path` ("/trust").
+  /// Puts one that is not on the disk at `path` ("/trust"). What was there is kept, as somebody may
+  /// be reading it: for what changes once in years.
   void Put(const std::string& path, std::string body, absl::string_view content_type);
 
   std::size_t size() const { return files_.size(); }
 
  private:
   std::map<std::string, StaticFile, std::less<>> files_;  // by path, "/assets/main-1a2b.js"
+  std::list<StaticFile> replaced_;
 };
 
 }  // namespace saccade

@@ -29,6 +29,10 @@ struct Access {
   AccessRole role = AccessRole::kWearer;
   std::int64_t expires_unix_s = 0;  // 0: never
   bool waiting = false;             // to be let in: may do nothing yet, and so has no role
+  /// Of whom the pass came: an invite, or a person who signed in; empty: of neither. Whoever has
+  /// many passes of one has no more than its allowance.
+  std::string invite_id{};
+  std::string person{};  // their name by the firm's provider; empty: did not sign in
 };
 
 }  // namespace saccade

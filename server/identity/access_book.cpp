@@ -79,7 +79,7 @@ class AccessBook::Impl {
     // Who tries the same forbidden thing over and over must not push others' deeds out.
     const bool refused = entry.outcome != "ok";
     const Timestamp now_ns = MonotonicNow();
-    entry.invite_id = ledger_.InviteOf(entry.access_id);
+    ledger_.Name(entry);
     const std::lock_guard guard(mutex_);
     if (unwritten_.size() >= kMaxUnwritten ||
         (refused && refusals_.Take(entry.access_id, now_ns))) {
@@ -202,6 +202,13 @@ void AccessBook::Redeem(std::string token, Done<Issued> done, std::string displa
 }
 void AccessBook::Revoke(std::string invite_id, Done<int> done) {
   impl_->Post([this, id = std::move(invite_id), done] { done(impl_->Revoke(id)); }, done);
+}
+void AccessBook::SignIn(SignedIn person, Done<Issued> done) {
+  impl_->Post([this, person = std::move(person), done] { done(impl_->ledger().SignIn(person)); },
+              done);
+}
+void AccessBook::LetBack(std::string id, Done<int> done) {
+  impl_->Post([this, id = std::move(id), done] { done(impl_->ledger().LetBack(id)); }, done);
 }
 std::vector<WaitingFacts> AccessBook::Waiting() const { return impl_->ledger().Waiting(); }
 void AccessBook::Admit(std::string id, bool refuse, Done<WaitingFacts> done) {

@@ -23,6 +23,17 @@ struct InviteFacts {
   int uses = 1, used = 0;
   bool revoked = false;
   bool waits = false;  // who comes by it waits to be let in
+  /// No invite, but somebody who signs in: `label` is their name, `used` how often they did.
+  bool person = false;
+};
+
+/// Somebody whom the firm's provider vouches for (ID token).
+struct SignedIn {
+  std::string key;   // of the person, at this provider: 64 hexadecimal digits
+  std::string name;  // one line of at most 60 bytes
+  AccessRole role = AccessRole::kViewer;
+  std::int64_t expires_unix_s = 0;
+  std::string proof;  // of what was signed (SHA-256): taken once
 };
 
 struct InviteDraft {
@@ -102,12 +113,18 @@ class AccessBook {
   /// Unauthenticated: unknown, expired, revoked, or used up. `display_name` is for whom lets people
   /// in.
   void Redeem(std::string token, Done<Issued> done, std::string display_name = "");
+  /// A pass for who signed in, which ends with the token; the newest sign-in says name and role.
+  ///   Unauthenticated    that token was taken before, or the person was revoked
+  ///   ResourceExhausted  too many at once
+  void SignIn(SignedIn person, Done<Issued> done);
   /// Who waits; who came first, first.
   std::vector<WaitingFacts> Waiting() const;
   /// Lets somebody in, or ends their pass. NotFound: nobody of that id waits.
   void Admit(std::string id, bool refuse, Done<WaitingFacts> done);
-  /// How many passes ended with it. NotFound: no such invite.
+  /// How many passes ended with it. NotFound: no such invite. A person stays out until LetBack.
   void Revoke(std::string invite_id, Done<int> done);
+  /// A person who was revoked may sign in again. NotFound; InvalidArgument: it is an invite.
+  void LetBack(std::string id, Done<int> done);
   /// Newest first.
   std::vector<InviteFacts> Invites() const;
 

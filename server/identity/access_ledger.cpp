@@ -15,6 +15,13 @@ absl::Status Refused(absl::string_view what) {
   return absl::UnauthenticatedError(absl::StrCat("access: ", what, "; ask for a new one"));
 }
 absl::Status Unknown() { return Refused("this invite is not known here"); }
+absl::Status SignedOut() {
+  return absl::UnauthenticatedError("access: your sign-in has expired; sign in again");
+}
+absl::Status Barred() {
+  return absl::UnauthenticatedError(
+      "access: your sign-in was revoked; ask who started the server (saccade revoke --undo)");
+}
 
 std::int64_t SystemUnix_s() {
   return std::chrono::duration_cast<std::chrono::seconds>(
@@ -74,7 +81,7 @@ absl::StatusOr<Issued> AccessLedger::CreateInvite(const InviteDraft& draft) {
   row.secret_sha256 = Sha256Hex(token.secret);
   {
     const std::lock_guard guard(mutex_);
-    if (invites_.size() >= options_.max_invites) {
+    if (!MakeRoom()) {
       return absl::ResourceExhaustedError(
           absl::StrCat("access: there are ", invites_.size(), " invites, as many as may be"));
     }
@@ -88,7 +95,7 @@ absl::StatusOr<Issued> AccessLedger::CreateInvite(const InviteDraft& draft) {
 absl::StatusOr<Issued> AccessLedger::Redeem(const std::string& text,
                                             const std::string& display_name) {
   const std::optional<Token> token = ParseToken(text);
-  if (!token) return Unknown();
+  if (!token || token->id.front() != 'i') return Unknown();
   InviteRow row;
   {
     const std::lock_guard guard(mutex_);
@@ -130,7 +137,7 @@ std::vector<WaitingFacts> AccessLedger::Waiting() const {
     for (const auto& [id, pass] : passes_) {
       if (pass.state != PassState::kWaiting) continue;
       const auto invite = invites_.find(pass.invite_id);
-      if (invite == invites_.end() || !EndOf(invite->second.facts).ok()) continue;
+      if (invite == invites_.end() || !EndOf(pass, invite->second.facts).ok()) continue;
       all.push_back(FactsOf(pass, invite->second.facts));
     }
   }
@@ -149,7 +156,7 @@ absl::StatusOr<WaitingFacts> AccessLedger::Admit(const std::string& id, bool ref
     const auto invite =
         found == passes_.end() ? invites_.end() : invites_.find(found->second.invite_id);
     if (invite == invites_.end() || found->second.state != PassState::kWaiting ||
-        !EndOf(invite->second.facts).ok()) {
+        !EndOf(found->second, invite->second.facts).ok()) {
       return absl::NotFoundError(
           absl::StrCat("id: nobody called ", id.substr(0, 40), " waits (any more)"));
     }
@@ -190,32 +197,44 @@ std::vector<InviteFacts> AccessLedger::Invites() const {
   return all;
 }
 
-std::string AccessLedger::InviteOf(const std::string& access_id) const {
+void AccessLedger::Name(AuditFacts& entry) const {
   const std::lock_guard guard(mutex_);
-  const auto pass = passes_.find(access_id);
-  return pass == passes_.end() ? "" : pass->second.invite_id;
+  const auto pass = passes_.find(entry.access_id);
+  if (pass == passes_.end()) return;
+  entry.invite_id = pass->second.invite_id;
+  const auto invite = invites_.find(entry.invite_id);
+  if (invite != invites_.end() && invite->second.facts.person) {
+    entry.display_name = invite->second.facts.label;
+  }
 }
 
 AccessLedger::Ended AccessLedger::TakeEnded() {
-  Ended told;
   const std::lock_guard guard(mutex_);
-  absl::flat_hash_map<std::string, std::vector<std::string>> by_invite;
+  absl::flat_hash_map<std::string, std::pair<std::vector<std::string>, absl::Status>> by_why;
   for (const auto& [id, pass] : passes_) {
-    if (!told_.contains(id)) by_invite[pass.invite_id].push_back(id);
-  }
-  for (auto& [invite_id, ids] : by_invite) {
-    const absl::Status why = EndOf(invites_[invite_id].facts);
+    if (told_.contains(id)) continue;
+    const absl::Status why = EndOf(pass, invites_[pass.invite_id].facts);
     if (why.ok()) continue;
-    for (const std::string& id : ids) told_[id] = true;
-    told.emplace_back(std::move(ids), why);
+    told_[id] = true;
+    auto& [ids, reason] = by_why[std::string(why.message())];
+    ids.push_back(id);
+    reason = why;
   }
+  Ended told;
+  for (auto& [words, group] : by_why) told.push_back(std::move(group));
   return told;
 }
 
 absl::Status AccessLedger::EndOf(const InviteFacts& invite) const {
+  if (invite.person && invite.revoked) return Barred();
   if (invite.revoked) return Refused("this invite was revoked");
-  if (Now() >= invite.expires_unix_s) return Refused("this invite has expired");
-  return absl::OkStatus();
+  if (Now() < invite.expires_unix_s) return absl::OkStatus();
+  return invite.person ? SignedOut() : Refused("this invite has expired");
+}
+
+absl::Status AccessLedger::EndOf(const PassRow& pass, const InviteFacts& invite) const {
+  if (absl::Status ended = EndOf(invite); !ended.ok()) return ended;
+  return pass.expires_unix_s != 0 && Now() >= pass.expires_unix_s ? SignedOut() : absl::OkStatus();
 }
 
 absl::StatusOr<Access> AccessLedger::CheckPass(const Token& token) const {
@@ -226,14 +245,21 @@ absl::StatusOr<Access> AccessLedger::CheckPass(const Token& token) const {
   const auto invite = invites_.find(pass->second.invite_id);
   if (invite == invites_.end()) return Unknown();
   const InviteFacts& facts = invite->second.facts;
-  if (absl::Status ended = EndOf(facts); !ended.ok()) return ended;
-  // Ended is ended, also where the clock was set back since.
-  if (told_.contains(token.id)) return Refused("this invite has expired");
+  if (absl::Status ended = EndOf(pass->second, facts); !ended.ok()) return ended;
+  // Ended is ended, also where the clock was set back, or the person was let back, since.
+  if (told_.contains(token.id)) {
+    return facts.person ? SignedOut() : Refused("this invite has expired");
+  }
   if (pass->second.state == PassState::kRefused) return Refused("you were not let in");
   const bool waiting = pass->second.state == PassState::kWaiting;
+  const std::int64_t own_end = pass->second.expires_unix_s;
   // Whoever compares roles alone lets nobody in too early.
-  return Access{token.id, waiting ? AccessRole::kAnyone : facts.role, facts.expires_unix_s,
-                waiting};
+  return Access{token.id,
+                waiting ? AccessRole::kAnyone : facts.role,
+                own_end != 0 ? own_end : facts.expires_unix_s,
+                waiting,
+                facts.id,
+                facts.person ? facts.label : ""};
 }
 
 }  // namespace saccade

@@ -31,6 +31,8 @@ class AccessLedger {
   absl::StatusOr<Access> Check(absl::string_view text) const;
   absl::StatusOr<Issued> CreateInvite(const InviteDraft& draft);
   absl::StatusOr<Issued> Redeem(const std::string& text, const std::string& display_name);
+  absl::StatusOr<Issued> SignIn(const SignedIn& person);
+  absl::StatusOr<int> LetBack(const std::string& id);
   std::vector<WaitingFacts> Waiting() const;
   absl::StatusOr<WaitingFacts> Admit(const std::string& id, bool refuse);
   /// In force when it returns, and then to be kept: whom one throws out is not to wait for the
@@ -38,16 +40,20 @@ class AccessLedger {
   absl::StatusOr<InviteRow> Revoke(const std::string& invite_id);
   absl::Status Keep(const InviteRow& invite);
   std::vector<InviteFacts> Invites() const;
-  /// Of a pass; empty: it is none.
-  std::string InviteOf(const std::string& access_id) const;
+  /// Fills in the invite of the entry's pass; of who signed in, also the name that is theirs.
+  void Name(AuditFacts& entry) const;
 
-  /// Passes whose invite has ended, by why; each is told once.
+  /// Passes that have ended, by why; each is told once.
   using Ended = std::vector<std::pair<std::vector<std::string>, absl::Status>>;
   Ended TakeEnded();
 
  private:
   std::int64_t Now() const { return options_.now_unix_s(); }
   absl::Status EndOf(const InviteFacts& invite) const;
+  absl::Status EndOf(const PassRow& pass, const InviteFacts& invite) const;
+  absl::StatusOr<InviteRow> RowOf(const SignedIn& person);
+  bool MakeRoom();
+  void ForgetEndedPasses(const std::string& invite_id);
   WaitingFacts FactsOf(const PassRow& pass, const InviteFacts& invite) const;
   absl::StatusOr<Access> CheckPass(const Token& token) const;
 

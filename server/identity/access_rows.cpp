@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "server/store/store_files.hpp"
@@ -14,8 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kVersion = 2;
-constexpr int kKeptAudit = 100'000;        // rows
+constexpr int kVersion = 3;
+constexpr int kKeptAudit = 100'000;  // rows
+constexpr std::int64_t kOld_s = 600;
 constexpr std::size_t kPruneAfter = 1000;  // entries written
 constexpr const char* kTables = R"(
 CREATE TABLE invites(
@@ -25,12 +27,13 @@ CREATE TABLE invites(
 CREATE TABLE passes(
   id TEXT PRIMARY KEY, invite_id TEXT NOT NULL REFERENCES invites(id) ON DELETE CASCADE,
   secret_sha256 TEXT NOT NULL, display_name TEXT NOT NULL DEFAULT '',
-  since_unix_s INTEGER NOT NULL DEFAULT 0, state INTEGER NOT NULL DEFAULT 0) STRICT;
+  since_unix_s INTEGER NOT NULL DEFAULT 0, state INTEGER NOT NULL DEFAULT 0,
+  expires_unix_s INTEGER NOT NULL DEFAULT 0, proof_sha256 TEXT NOT NULL DEFAULT '') STRICT;
 CREATE TABLE audit(
   number INTEGER PRIMARY KEY AUTOINCREMENT, unix_ms INTEGER NOT NULL, participant_id TEXT NOT NULL,
   display_name TEXT NOT NULL, access_id TEXT NOT NULL, invite_id TEXT NOT NULL, call TEXT NOT NULL,
   outcome TEXT NOT NULL) STRICT;
-PRAGMA user_version = 2;
+PRAGMA user_version = 3;
 )";
 // From version 1, which had no waiting room.
 constexpr const char* kFrom1 = R"(
@@ -39,6 +42,12 @@ ALTER TABLE passes ADD COLUMN display_name TEXT NOT NULL DEFAULT '';
 ALTER TABLE passes ADD COLUMN since_unix_s INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE passes ADD COLUMN state INTEGER NOT NULL DEFAULT 0;
 PRAGMA user_version = 2;
+)";
+// From version 2, in which nobody signed in.
+constexpr const char* kFrom2 = R"(
+ALTER TABLE passes ADD COLUMN expires_unix_s INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE passes ADD COLUMN proof_sha256 TEXT NOT NULL DEFAULT '';
+PRAGMA user_version = 3;
 )";
 
 absl::Status Prepare(SqliteDatabase& database, const fs::path& file) {
@@ -52,7 +61,10 @@ absl::Status Prepare(SqliteDatabase& database, const fs::path& file) {
     return database.Execute(absl::StrCat("BEGIN IMMEDIATE;", kTables, "COMMIT").c_str());
   }
   if (*version == "1") {
-    return database.Execute(absl::StrCat("BEGIN IMMEDIATE;", kFrom1, "COMMIT").c_str());
+    return database.Execute(absl::StrCat("BEGIN IMMEDIATE;", kFrom1, kFrom2, "COMMIT").c_str());
+  }
+  if (*version == "2") {
+    return database.Execute(absl::StrCat("BEGIN IMMEDIATE;", kFrom2, "COMMIT").c_str());
   }
   if (*version == absl::StrCat(kVersion)) return absl::OkStatus();
   return absl::FailedPreconditionError(
@@ -72,6 +84,7 @@ InviteRow ReadInvite(const SqliteStatement& row) {
   invite.facts.used = static_cast<int>(row.Int(7));
   invite.facts.revoked = row.Int(8) != 0;
   invite.facts.waits = row.Int(9) != 0;
+  invite.facts.person = !invite.facts.id.empty() && invite.facts.id.front() == 's';
   return invite;
 }
 
@@ -106,8 +119,10 @@ absl::StatusOr<std::unique_ptr<AccessRows>> AccessRows::Open(const fs::path& dir
 
 absl::Status AccessRows::Load(std::int64_t forget_before_unix_s, std::vector<InviteRow>& invites,
                               std::vector<PassRow>& passes) {
+  // People who are barred stay so.
   const std::string forget =
-      absl::StrCat("DELETE FROM invites WHERE expires_unix_s < ", forget_before_unix_s);
+      absl::StrCat("DELETE FROM invites WHERE expires_unix_s < ", forget_before_unix_s,
+                   " AND NOT (revoked AND id GLOB 's*')");
   if (absl::Status done = database_->Execute(forget.c_str()); !done.ok()) return done;
   if (absl::Status done = PruneAudit(); !done.ok()) return done;
   absl::StatusOr<SqliteStatement> all = database_->Prepare("SELECT * FROM invites");
@@ -125,7 +140,7 @@ absl::Status AccessRows::Load(std::int64_t forget_before_unix_s, std::vector<Inv
     if (!row.ok()) return row.status();
     if (!*row) return absl::OkStatus();
     passes.push_back({rest->Text(0), rest->Text(1), rest->Text(2), rest->Text(3), rest->Int(4),
-                      static_cast<PassState>(rest->Int(5))});
+                      static_cast<PassState>(rest->Int(5)), rest->Int(6), rest->Text(7)});
   }
 }
 
@@ -133,7 +148,9 @@ absl::Status AccessRows::Write(const InviteRow& invite) {
   // No REPLACE: it would delete the row, and its passes with it.
   absl::StatusOr<SqliteStatement> statement = database_->Prepare(
       "INSERT INTO invites VALUES(?,?,?,?,?,?,?,?,?,?) "
-      "ON CONFLICT(id) DO UPDATE SET used = excluded.used, revoked = excluded.revoked");
+      "ON CONFLICT(id) DO UPDATE SET used = excluded.used, revoked = excluded.revoked, "
+      "uses = excluded.uses, role = excluded.role, label = excluded.label, "
+      "expires_unix_s = excluded.expires_unix_s, waits = excluded.waits");
   if (!statement.ok()) return statement.status();
   const InviteFacts& facts = invite.facts;
   statement->Bind(0, std::string_view(facts.id));
@@ -152,7 +169,7 @@ absl::Status AccessRows::Write(const InviteRow& invite) {
 
 absl::Status AccessRows::Write(const PassRow& pass) {
   absl::StatusOr<SqliteStatement> statement = database_->Prepare(
-      "INSERT INTO passes VALUES(?,?,?,?,?,?) "
+      "INSERT INTO passes VALUES(?,?,?,?,?,?,?,?) "
       "ON CONFLICT(id) DO UPDATE SET state = excluded.state");
   if (!statement.ok()) return statement.status();
   statement->Bind(0, std::string_view(pass.id));
@@ -161,6 +178,8 @@ absl::Status AccessRows::Write(const PassRow& pass) {
   statement->Bind(3, std::string_view(pass.display_name));
   statement->Bind(4, pass.since_unix_s);
   statement->Bind(5, static_cast<std::int64_t>(pass.state));
+  statement->Bind(6, pass.expires_unix_s);
+  statement->Bind(7, std::string_view(pass.proof_sha256));
   return statement->Run();
 }
 
@@ -193,9 +212,30 @@ absl::Status AccessRows::Put(const PassRow& pass) { return Write(pass); }
 
 absl::Status AccessRows::Put(const InviteRow& invite, const PassRow& pass) {
   return InTransaction([&] {
-    const absl::Status status = Write(invite);
+    absl::Status status = Write(invite);
+    // Of who signs in again and again: those whose token is too old to be shown once more.
+    if (status.ok() && invite.facts.person) {
+      status = DeletePasses(invite.facts.id, pass.since_unix_s - kOld_s);
+    }
     return status.ok() ? Write(pass) : status;
   });
+}
+
+absl::Status AccessRows::EndPasses(const InviteRow& person) {
+  return InTransaction([&] {
+    const absl::Status status = Write(person);
+    return status.ok() ? DeletePasses(person.facts.id, std::numeric_limits<std::int64_t>::max())
+                       : status;
+  });
+}
+
+absl::Status AccessRows::DeletePasses(const std::string& invite_id, std::int64_t before_unix_s) {
+  absl::StatusOr<SqliteStatement> statement =
+      database_->Prepare("DELETE FROM passes WHERE invite_id = ? AND expires_unix_s < ?");
+  if (!statement.ok()) return statement.status();
+  statement->Bind(0, std::string_view(invite_id));
+  statement->Bind(1, before_unix_s);
+  return statement->Run();
 }
 
 absl::Status AccessRows::Put(const std::vector<AuditFacts>& entries) {

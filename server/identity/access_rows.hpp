@@ -24,6 +24,9 @@ struct PassRow {
   std::string display_name;  // of the waiting room
   std::int64_t since_unix_s = 0;
   PassState state = PassState::kIn;
+  // Of who signed in:
+  std::int64_t expires_unix_s = 0;  // 0: with its invite
+  std::string proof_sha256{};       // of the token that was shown; empty: none
 };
 
 /// DIR/access.sqlite. One thread at a time.
@@ -39,6 +42,8 @@ class AccessRows {
   absl::Status Put(const InviteRow& invite);
   absl::Status Put(const InviteRow& invite, const PassRow& pass);  // both or neither
   absl::Status Put(const PassRow& pass);
+  /// Keeps `person`, and forgets the passes that they have.
+  absl::Status EndPasses(const InviteRow& person);
   absl::Status Put(const std::vector<AuditFacts>& entries);  // likewise
 
   /// The newest `most`, oldest first.
@@ -50,6 +55,7 @@ class AccessRows {
   absl::Status Write(const PassRow& pass);
   absl::Status Write(const AuditFacts& entry);
   absl::Status PruneAudit();
+  absl::Status DeletePasses(const std::string& invite_id, std::int64_t before_unix_s);
   template <typename WriteAll>
   absl::Status InTransaction(WriteAll write_all);
 

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/time/time.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -19,7 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kRenew_s = 30 * 86'400;
+constexpr std::int64_t kDay_s = 86'400;
+constexpr std::int64_t kRenew_s = 30 * kDay_s;
+constexpr std::int64_t kSayAuthority_s = 60 * kDay_s, kSayGiven_s = 14 * kDay_s;
 constexpr std::size_t kMaxPemBytes = 256 * 1024;
 
 absl::StatusOr<CertificateAndKey> Read(const fs::path& certificate, const fs::path& key) {
@@ -121,6 +124,31 @@ absl::StatusOr<ServerIdentity> EnsureServerIdentity(const fs::path& data_dir,
   if (!root.ok()) return root.status();
   return ServerIdentity{server->certificate_pem + authority->certificate_pem, server->key_pem,
                         authority->certificate_pem, root->sha256, LeftOut(asked, names)};
+}
+
+std::string ExpiryWarning(const ServerIdentity& identity, std::int64_t now_unix_s) {
+  const bool own = !identity.root_pem.empty();
+  const absl::StatusOr<CertificateFacts> facts =
+      InspectCertificate(own ? identity.root_pem : identity.chain_pem);
+  if (!facts.ok()) return "";
+  const std::int64_t left_s = facts->not_after_unix_s - now_unix_s;
+  if (left_s > (own ? kSayAuthority_s : kSayGiven_s)) return "";
+  const std::string day = absl::FormatTime(
+      "%Y-%m-%d", absl::FromUnixSeconds(facts->not_after_unix_s), absl::UTCTimeZone());
+  if (own) {
+    const std::int64_t days = std::max<std::int64_t>(0, (left_s - kRenew_s) / kDay_s);
+    return absl::StrCat(
+        "tls: this server's authority ends on ", day, "; in ", days,
+        " days a new one is made, which everybody has to trust anew (/trust, "
+        "`saccade trust`); to choose the day, stop the server and move DATA_DIR/tls "
+        "away");
+  }
+  if (left_s <= 0) {
+    return absl::StrCat("tls: the given certificate ended on ", day,
+                        ": nobody can connect; put a new one in its place, it is taken up at once");
+  }
+  return absl::StrCat("tls: the given certificate ends on ", day, ", in ", left_s / kDay_s,
+                      " days; put a new one in its place, it is taken up at once");
 }
 
 absl::StatusOr<ServerIdentity> LoadServerIdentity(const fs::path& certificate, const fs::path& key,

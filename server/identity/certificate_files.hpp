@@ -33,6 +33,11 @@ absl::StatusOr<ServerIdentity> EnsureServerIdentity(const std::filesystem::path&
                                                     const ServerNames& names,
                                                     std::int64_t now_unix_s);
 
+/// What has to be said in the last weeks of what a server shows, in words with the remedy: of a
+/// given certificate, that nobody can connect when it ends; of an authority of our own, that a new
+/// one comes, which everybody has to trust anew. Empty: there is time.
+std::string ExpiryWarning(const ServerIdentity& identity, std::int64_t now_unix_s);
+
 /// From files that somebody else made (tls.certificate, tls.key). InvalidArgument names the file.
 absl::StatusOr<ServerIdentity> LoadServerIdentity(const std::filesystem::path& certificate,
                                                   const std::filesystem::path& key,

@@ -10,6 +10,8 @@ using enum AccessRole;
 constexpr auto kTable = std::to_array<RoleRow>({
     {"AccessService/GetAccess", kAnyone},  // says whether one needs a token
     {"AccessService/Redeem", kAnyone},     // an invite is its own admission
+    {"AccessService/BeginSignIn", kAnyone},
+    {"AccessService/FinishSignIn", kAnyone},
     {"AccessService/CreateInvite", kOwner},
     {"AccessService/ListInvites", kOwner},
     {"AccessService/RevokeInvite", kOwner},

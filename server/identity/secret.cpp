@@ -24,6 +24,12 @@ std::string RandomBytes() {
   return {bytes.begin(), bytes.end()};
 }
 
+std::string Sha256(absl::string_view data) {
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> hash{};
+  SHA256(reinterpret_cast<const unsigned char*>(data.data()), data.size(), hash.data());
+  return {reinterpret_cast<const char*>(hash.data()), hash.size()};
+}
+
 bool IsBase64Url(char c) {
   return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_';
 }
@@ -48,10 +54,10 @@ std::optional<Token> ParseToken(absl::string_view text) {
   return Token{std::string(id), std::string(secret)};
 }
 
-std::string Sha256Hex(absl::string_view data) {
-  std::array<unsigned char, SHA256_DIGEST_LENGTH> hash{};
-  SHA256(reinterpret_cast<const unsigned char*>(data.data()), data.size(), hash.data());
-  return absl::BytesToHexString({reinterpret_cast<const char*>(hash.data()), hash.size()});
+std::string Sha256Hex(absl::string_view data) { return absl::BytesToHexString(Sha256(data)); }
+
+std::string Sha256Base64Url(absl::string_view data) {
+  return absl::WebSafeBase64Escape(Sha256(data));
 }
 
 bool SameSecret(absl::string_view a, absl::string_view b) {

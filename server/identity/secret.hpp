@@ -25,6 +25,9 @@ std::optional<Token> ParseToken(absl::string_view text);
 /// entropy, so no salt and no slow hash are needed.
 std::string Sha256Hex(absl::string_view data);
 
+/// SHA-256 as base64url without padding, 43 characters (PKCE's S256).
+std::string Sha256Base64Url(absl::string_view data);
+
 /// In a time that tells only whether the lengths differ.
 bool SameSecret(absl::string_view a, absl::string_view b);
 

@@ -36,6 +36,11 @@ absl::Status ConnectionGate::Admit(const std::string& peer, const ConnectionCoun
                                   " are open from this address, as many as may be"),
                      kAgain_ns);
   }
+  if (limits_.of_network > 0 && counts.of_network >= limits_.of_network) {
+    return BusyError(absl::StrCat("connections: ", counts.of_network,
+                                  " are open from this network, as many as may be"),
+                     kAgain_ns);
+  }
   if (limits_.unheard_of_address > 0 && counts.unheard_of_address >= limits_.unheard_of_address) {
     return BusyError(absl::StrCat("connections: ", counts.unheard_of_address,
                                   " from this address have not said anything yet, as many as may"),

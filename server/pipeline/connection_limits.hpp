@@ -13,7 +13,8 @@ namespace saccade {
 /// connections each are far below.
 struct ConnectionLimits {
   int all = 1024;
-  int of_address = 256;  // 0: no limit, as of the next
+  int of_address = 256;  // 0: no limit, as of the next two
+  int of_network = 512;  // of one NetworkKey: who has many addresses side by side
   // Of these, who has not said anything whole yet: half a handshake, half a request.
   int unheard_of_address = 64;
   RateLimit new_of_address{50, 300};  // handshakes, mostly: half a millisecond of a core each
@@ -23,7 +24,7 @@ struct ConnectionLimits {
 
 /// What is open at a port now.
 struct ConnectionCounts {
-  int all = 0, of_address = 0, unheard_of_address = 0;
+  int all = 0, of_address = 0, unheard_of_address = 0, of_network = 0;
 };
 
 /// Decides about connections before a byte of them is read. One thread.

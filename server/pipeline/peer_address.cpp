@@ -43,6 +43,11 @@ std::string PeerKey(absl::string_view address) {
   return network;
 }
 
+std::string NetworkKey(absl::string_view peer) {
+  if (absl::StartsWith(peer, "ipv4:")) return std::string(peer.substr(0, peer.rfind('.')));
+  return std::string(peer.substr(0, std::string_view("ipv6:").size() + 12));
+}
+
 bool IsThisMachine(absl::string_view peer) {
   return absl::StartsWith(peer, "ipv4:127.") || peer == "ipv6:::1" ||
          absl::StartsWith(peer, "unix") || absl::StartsWith(peer, "inproc");

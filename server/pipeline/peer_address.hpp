@@ -14,6 +14,10 @@ std::string PlainAddress(absl::string_view address);
 /// household). `address` is an IP literal; an IPv4 caller of a socket for both is himself.
 std::string PeerKey(absl::string_view address);
 
+/// Of such a key the network: IPv4's first 24 bits, IPv6's first 48, what a provider gives one
+/// customer.
+std::string NetworkKey(absl::string_view peer);
+
 /// Whether who is counted so is on this machine: loopback, a socket file, or the process itself.
 bool IsThisMachine(absl::string_view peer);
 

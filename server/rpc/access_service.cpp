@@ -48,6 +48,7 @@ void Fill(const InviteFacts& facts, v1::Invite& invite) {
   invite.set_revoked(facts.revoked);
   invite.set_label(facts.label);
   invite.set_waiting_room(facts.waits);
+  invite.set_person(facts.person);
 }
 
 void Fill(const WaitingFacts& facts, v1::WaitingPerson& person) {
@@ -90,8 +91,13 @@ absl::StatusOr<InviteDraft> FromProto(const v1::CreateInviteRequest& request) {
 
 }  // namespace
 
-AccessService::AccessService(AccessBook& book, Gatekeeper& gate, MakeLink make_link, bool insecure)
-    : book_(book), gate_(gate), make_link_(std::move(make_link)), insecure_(insecure) {
+AccessService::AccessService(AccessBook& book, Gatekeeper& gate, MakeLink make_link, bool insecure,
+                             IdentityProvider* provider)
+    : book_(book),
+      gate_(gate),
+      make_link_(std::move(make_link)),
+      insecure_(insecure),
+      provider_(provider) {
   // By their numbers in the proto; limits_test calls every one.
   MarkMethodCallback(0, Early(gate, "AccessService/GetAccess", this, &AccessService::GetAccess));
   MarkMethodCallback(1, Early(gate, "AccessService/Redeem", this, &AccessService::Redeem));
@@ -105,6 +111,10 @@ AccessService::AccessService(AccessBook& book, Gatekeeper& gate, MakeLink make_l
                      Early(gate, "AccessService/ListWaiting", this, &AccessService::ListWaiting));
   MarkMethodCallback(6, Early(gate, "AccessService/Admit", this, &AccessService::Admit));
   MarkMethodCallback(7, Early(gate, "AccessService/ListAudit", this, &AccessService::ListAudit));
+  MarkMethodCallback(8,
+                     Early(gate, "AccessService/BeginSignIn", this, &AccessService::BeginSignIn));
+  MarkMethodCallback(9,
+                     Early(gate, "AccessService/FinishSignIn", this, &AccessService::FinishSignIn));
 }
 
 grpc::ServerUnaryReactor* AccessService::GetAccess(Context* context,
@@ -116,6 +126,7 @@ grpc::ServerUnaryReactor* AccessService::GetAccess(Context* context,
   }
   response->set_token_required(book_.token_required());
   response->set_insecure(insecure_);
+  if (provider_ != nullptr) response->set_sign_in_name(provider_->name());
   const absl::StatusOr<Access> access = gate_.Who(*context);
   if (access.ok()) {
     response->set_waiting(access->waiting);
@@ -136,14 +147,24 @@ grpc::ServerUnaryReactor* AccessService::Redeem(Context* context, const v1::Rede
   if (absl::Status name = CheckDisplayName(request->display_name()); !name.ok()) {
     return call.Finish(name);
   }
-  const auto fill = [response](const Issued& issued) {
-    response->set_token(issued.token);
-    response->set_role(ToProto(issued.invite.role));
-    response->set_expires_unix_s(issued.invite.expires_unix_s);
-    response->set_waiting(issued.waiting);
-  };
+  if (!request->id_token().empty()) {
+    if (!request->invite().empty()) {
+      return call.Finish(absl::InvalidArgumentError("id_token: give either this or an invite"));
+    }
+    if (provider_ == nullptr) return call.Finish(NoProvider());
+    provider_->Verify(request->id_token(), LetIn(call, response));
+    return call.reactor();
+  }
+  const auto fill = [response](const Issued& issued) { Tell(issued, *response); };
   book_.Redeem(request->invite(), call.Answer<Issued>(fill), request->display_name());
   return call.reactor();
+}
+
+void AccessService::Tell(const Issued& issued, v1::RedeemResponse& response) {
+  response.set_token(issued.token);
+  response.set_role(ToProto(issued.invite.role));
+  response.set_expires_unix_s(issued.invite.expires_unix_s);
+  response.set_waiting(issued.waiting);
 }
 
 grpc::ServerUnaryReactor* AccessService::CreateInvite(Context* context,
@@ -181,9 +202,13 @@ grpc::ServerUnaryReactor* AccessService::RevokeInvite(Context* context,
   if (const auto entered = call.Enter(gate_, Toll::kRead); !entered.ok()) {
     return call.Finish(entered.status());
   }
-  book_.Revoke(request->id(), call.Answer<int>([response](int passes) {
-    response->set_passes(static_cast<std::uint32_t>(passes));
-  }));
+  const auto answer = call.Answer<int>(
+      [response](int passes) { response->set_passes(static_cast<std::uint32_t>(passes)); });
+  if (request->undo()) {
+    book_.LetBack(request->id(), answer);
+  } else {
+    book_.Revoke(request->id(), answer);
+  }
   return call.reactor();
 }
 

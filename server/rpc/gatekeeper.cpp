@@ -37,7 +37,7 @@ std::string SocketAddress(const std::string& peer) {
   return "";
 }
 
-std::string IdOf(const absl::StatusOr<Access>& access) { return access.ok() ? access->id : ""; }
+Access Known(const absl::StatusOr<Access>& access) { return access.ok() ? *access : Access(); }
 
 bool IsInProcess(const grpc::CallbackServerContext& context) {
   return absl::StartsWith(context.peer(), "inproc");
@@ -66,12 +66,12 @@ std::string Gatekeeper::PeerOf(const Context& context) const {
 
 absl::Status Gatekeeper::Arrive(const Context& context, std::size_t bytes) {
   if (IsInProcess(context)) return absl::OkStatus();
-  return traffic_.Admit(PeerOf(context), IdOf(Who(context)), bytes, MonotonicNow());
+  return traffic_.Admit(PeerOf(context), Known(Who(context)), bytes, MonotonicNow());
 }
 
 absl::Status Gatekeeper::AdmitBrowser(absl::string_view address, absl::string_view authorization,
                                       std::size_t bytes) {
-  return traffic_.Admit(PeerKey(address), IdOf(access_.Check(TokenIn(authorization))), bytes,
+  return traffic_.Admit(PeerKey(address), Known(access_.Check(TokenIn(authorization))), bytes,
                         MonotonicNow());
 }
 

@@ -167,7 +167,9 @@ ConnectionCounts GrpcListener::Count(const std::string& peer, Timestamp now_ns) 
   std::erase_if(open_, [](const Open& one) { return SocketNumber(one.fd) != one.socket; });
   ConnectionCounts counts;
   counts.all = static_cast<int>(open_.size());
+  const std::string network = NetworkKey(peer);
   for (const Open& one : open_) {
+    if (NetworkKey(one.peer) == network) ++counts.of_network;
     if (one.peer != peer) continue;
     ++counts.of_address;
     // A handshake takes two messages of the caller's; who never sends them is closed by gRPC.

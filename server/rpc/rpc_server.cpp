@@ -93,7 +93,8 @@ class RpcServer::Impl {
         gate_(sessions_, access_,
               {options.limits, options.traffic, options.machines, options.trusted_proxy}),
         health_service_(gate_),
-        access_service_(access_, gate_, options.make_link, options.insecure),
+        access_service_(access_, gate_, options.make_link, options.insecure, options.provider),
+        provider_(options.provider),
         session_service_(backend, hub, gate_),
         annotation_service_(backend, gate_),
         map_service_(backend, hub, gate_),
@@ -159,6 +160,7 @@ class RpcServer::Impl {
     listener_->Stop();
     hub_.CloseAll(absl::UnavailableError("the server is shutting down"));
     health_service_.Stop();
+    if (provider_ != nullptr) provider_->Stop();  // its calls are answered
     server_->Shutdown(std::chrono::system_clock::now() + grace);
     server_->Wait();
     server_ = nullptr;
@@ -185,6 +187,7 @@ class RpcServer::Impl {
   Gatekeeper gate_;
   HealthService health_service_;
   AccessService access_service_;
+  IdentityProvider* const provider_;
   SessionService session_service_;
   AnnotationService annotation_service_;
   MapService map_service_;

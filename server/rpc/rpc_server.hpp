@@ -9,6 +9,7 @@
 #include <string>
 
 #include "server/identity/access_book.hpp"
+#include "server/identity/identity_provider.hpp"
 #include "server/pipeline/connection_limits.hpp"
 #include "server/rpc/admission.hpp"
 #include "server/rpc/backend.hpp"
@@ -54,6 +55,8 @@ struct RpcServerOptions {
   MachineRoles machines;
   /// Who may come in; outlives the server. Null: everybody, and invites end with the server.
   AccessBook* access = nullptr;
+  /// With whom people sign in; outlives the server, which stops it. Null: nobody does.
+  IdentityProvider* provider = nullptr;
   /// What a browser opens with an invite. Any thread.
   std::function<std::string(AccessRole, const std::string& token)> make_link;
   bool insecure = false;  // plain beyond loopback: told to every page

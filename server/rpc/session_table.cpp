@@ -71,8 +71,11 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
   }
   Session session;
   session.display_name = request.display_name().empty() ? "guest" : request.display_name();
+  if (!access.person.empty())
+    session.display_name = access.person;  // who signed in is who they are
   session.role = RoleWithin(request.role(), access.role);
   session.access_id = access.id;
+  session.invite_id = access.invite_id;
   const std::lock_guard lock(mutex_);
   const auto known = sessions_.find(resumed);
   if (known != sessions_.end() && known->second.session.access_id == access.id) {
@@ -88,7 +91,12 @@ absl::StatusOr<Session> SessionTable::Join(const v1::JoinRequest& request, Times
     slot.used = true;
     return session;
   }
-  if (absl::Status own = CheckToken(access.id, now_ns); !own.ok()) return own;
+  const absl::Status own =
+      CheckOwn(&Session::access_id, access.id, options_.max_sessions_of_token, now_ns);
+  if (!own.ok()) return own;
+  const absl::Status all =
+      CheckOwn(&Session::invite_id, access.invite_id, options_.max_sessions_of_invite, now_ns);
+  if (!all.ok()) return all;
   if (!MakeRoom(now_ns)) {
     return BusyError(absl::StrCat("sessions: ", sessions_.size(), " are in use, as many as may be"),
                      options_.unused_ns);
@@ -122,19 +130,20 @@ void SessionTable::Identify(const std::string& key, Timestamp now_ns, Session& s
   session.color_rgba = colors_[session.person_id] = ChoosePersonColor(session.person_id, in_use);
 }
 
-// Of one's own sessions those that nobody uses make room: they are nobody else's.
-absl::Status SessionTable::CheckToken(const std::string& access_id, Timestamp now_ns) {
-  if (access_id.empty() || options_.max_sessions_of_token == 0) return absl::OkStatus();
+// Of one's own sessions, or one's invite's, those that nobody uses make room.
+absl::Status SessionTable::CheckOwn(std::string Session::*owner, const std::string& id,
+                                    std::size_t most, Timestamp now_ns) {
+  if (id.empty() || most == 0) return absl::OkStatus();
   std::size_t count = 0;
   auto oldest = sessions_.end();
   for (auto at = sessions_.begin(); at != sessions_.end(); ++at) {
     const Slot& slot = at->second;
-    if (slot.session.access_id != access_id) continue;
+    if (slot.session.*owner != id) continue;
     ++count;
     if (slot.holds > 0 || now_ns - slot.used_ns < options_.unused_ns) continue;
     if (oldest == sessions_.end() || slot.used_ns < oldest->second.used_ns) oldest = at;
   }
-  if (count < options_.max_sessions_of_token) return absl::OkStatus();
+  if (count < most) return absl::OkStatus();
   if (oldest == sessions_.end()) {
     return BusyError(
         absl::StrCat("sessions: ", count, " of this invite are in use, as many as may"),

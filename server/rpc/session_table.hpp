@@ -27,6 +27,7 @@ struct Session {
   std::string person_id;  // UUID; public: who stands behind it, in this session and others
   bool has_key = false;   // the person can come back in another session
   std::uint32_t color_rgba = 0;  // the person's
+  std::string invite_id;  // of whom that token came (Access::invite_id)
 };
 
 /// One line that goes into others' lists and into the log. InvalidArgument: too long, or it holds a
@@ -35,7 +36,8 @@ absl::Status CheckDisplayName(const std::string& name);
 
 struct SessionTableOptions {
   std::size_t max_sessions = 1000;
-  std::size_t max_sessions_of_token = 32;  // 0: no limit; where there are no tokens there is none
+  std::size_t max_sessions_of_token = 32;    // 0: no limit; where there are no tokens there is none
+  std::size_t max_sessions_of_invite = 128;  // of all that came by one invite together; likewise
   // Where the table is full, these make room, and only these: who works is never put out by who
   // joins.
   Timestamp unused_ns = 5'000'000'000;  // joined so long ago, and never heard of again
@@ -86,7 +88,8 @@ class SessionTable {
     int holds = 0;
   };
   bool MakeRoom(Timestamp now_ns);
-  absl::Status CheckToken(const std::string& access_id, Timestamp now_ns);
+  absl::Status CheckOwn(std::string Session::*owner, const std::string& id, std::size_t most,
+                        Timestamp now_ns);
   void Release(const std::string& session_id);
   void TellGone();
   void Identify(const std::string& key, Timestamp now_ns, Session& session);

@@ -29,17 +29,28 @@ TrafficGate::TrafficGate(const TrafficLimits& limits)
       token_requests_(limits.token_requests),
       token_bytes_(limits.token_bytes),
       address_requests_(limits.address_requests),
-      address_bytes_(limits.address_bytes) {}
+      address_bytes_(limits.address_bytes),
+      invite_requests_(limits.invite_requests),
+      invite_bytes_(limits.invite_bytes) {}
 
-absl::Status TrafficGate::Admit(const std::string& peer, const std::string& access_id,
-                                std::size_t bytes, Timestamp now_ns) {
+absl::Status TrafficGate::Admit(const std::string& peer, const Access& access, std::size_t bytes,
+                                Timestamp now_ns) {
   const double size = static_cast<double>(bytes);
-  if (const std::string& id = access_id; !id.empty()) {
-    absl::Status status = Judge(token_requests_.Take(id, now_ns), limits_.token_requests, "calls",
-                                "with this invite");
+  if (const std::string& id = access.id; !id.empty()) {
+    absl::Status status =
+        Judge(token_requests_.Take(id, now_ns), limits_.token_requests, "calls", "with this pass");
     if (status.ok()) {
       status = Judge(token_bytes_.Take(id, now_ns, size), limits_.token_bytes, "bytes",
-                     "with this invite");
+                     "with this pass");
+    }
+    // Who redeems a link many times has many passes, but no more than a room full of people.
+    if (const std::string& invite = access.invite_id; status.ok() && !invite.empty()) {
+      status = Judge(invite_requests_.Take(invite, now_ns), limits_.invite_requests, "calls",
+                     "by everybody with this invite");
+      if (status.ok()) {
+        status = Judge(invite_bytes_.Take(invite, now_ns, size), limits_.invite_bytes, "bytes",
+                       "by everybody with this invite");
+      }
     }
     if (!status.ok() || !courtesy_.Take(id, now_ns)) return status;
   }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string>
 
+#include "server/identity/access.hpp"
 #include "server/pipeline/rate_limiter.hpp"
 
 namespace saccade {
@@ -16,6 +17,8 @@ namespace saccade {
 struct TrafficLimits {
   RateLimit token_requests{500, 3000}, address_requests{2000, 10'000};
   RateLimit token_bytes{8e6, 32e6}, address_bytes{32e6, 128e6};
+  /// Of all passes that came by one invite together, as of an address: a room full of people.
+  RateLimit invite_requests{2000, 10'000}, invite_bytes{32e6, 128e6};
   bool this_machine = false;  // loopback, which may be a proxy, is limited by address, too
 };
 
@@ -27,14 +30,15 @@ class TrafficGate {
  public:
   explicit TrafficGate(const TrafficLimits& limits);
 
-  /// `peer` as PeerKey, `access_id` of a valid token (Access::id; empty: none), `bytes` of the
-  /// message. ResourceExhausted says whose limit it is, how much that is, and when to try again.
-  absl::Status Admit(const std::string& peer, const std::string& access_id, std::size_t bytes,
+  /// `peer` as PeerKey, `access` of a valid token (without an id: none), `bytes` of the message.
+  /// ResourceExhausted says whose limit it is, how much that is, and when to try again.
+  absl::Status Admit(const std::string& peer, const Access& access, std::size_t bytes,
                      Timestamp now_ns);
 
  private:
   const TrafficLimits limits_;
   RateLimiter courtesy_, token_requests_, token_bytes_, address_requests_, address_bytes_;
+  RateLimiter invite_requests_, invite_bytes_;
 };
 
 }  // namespace saccade

@@ -49,6 +49,8 @@ const std::vector<Home>& Homes() {
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},
       {"openssl/", {"server/identity", "client/net"}},
+      {"cjose/", {"server/identity"}},
+      {"curl/", {"server/identity"}},
       {"qrencode.h", {"shared/io"}},
       {"wels/", {"server/encode", "client/decode"}},
       {"GL/osmesa.h", {"server/gl"}},

@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -20,11 +21,13 @@ namespace saccade {
 namespace {
 
 constexpr char kHelp[] =
-    "usage: saccade-decode [--after NS] < VIDEO | saccade-decode --url rtsp://HOST[:PORT]/PATH\n"
+    "usage: saccade-decode [--after NS] < VIDEO | saccade-decode --stream < ADDRESS\n"
     "       saccade-decode --packets [--most-pixels N] < PACKETS\n"
     "       saccade-decode --try-sandbox [--network] | --version\n"
     "Decodes a video and writes its pictures to standard output, in a form of its own.\n"
     "saccade-server starts it for file:, rtsp: and phone: sources.\n";
+
+constexpr std::size_t kMostAddressBytes = 4096;
 
 /// The host by its number: in the sandbox no file can be opened, and names are looked up in files.
 std::string WithAddress(const std::string& url) {
@@ -50,6 +53,21 @@ std::string WithAddress(const std::string& url) {
          (host_end == std::string::npos ? "" : url.substr(host_end));
 }
 
+/// rtsp://HOST[:PORT]/PATH from standard input: it may hold a password, and every account of the
+/// machine sees the words that a process was started with.
+std::string ReadAddress() {
+  std::string address(kMostAddressBytes, '\0');
+  std::size_t size = 0;
+  while (size < address.size()) {
+    const ssize_t got = read(STDIN_FILENO, address.data() + size, address.size() - size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) break;
+    size += static_cast<std::size_t>(got);
+  }
+  address.resize(size);
+  return address;
+}
+
 int Main(int argc, char** argv) {
   DecodeRequest request;
   bool attempt = false, network = false, packets = false;
@@ -59,8 +77,8 @@ int Main(int argc, char** argv) {
     const bool has_value = i + 1 < argc;
     if (word == "--after" && has_value) {
       request.after_ns = std::atoll(argv[++i]);
-    } else if (word == "--url" && has_value) {
-      request.url = argv[++i];
+    } else if (word == "--stream") {
+      request.url = ReadAddress();
     } else if (word == "--try-sandbox") {
       attempt = true;
     } else if (word == "--packets") {

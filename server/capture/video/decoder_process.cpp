@@ -25,6 +25,7 @@ constexpr std::chrono::milliseconds kMostBytesTake(5'000);
 constexpr std::size_t kMostText = 4'000;
 constexpr std::size_t kSkippedAtOnce = 1 << 16;
 constexpr int kPipeBytes = 1 << 20;
+constexpr std::size_t kMostAddressBytes = 4096;
 
 absl::StatusOr<int> OpenVideoFile(const std::filesystem::path& file) {
   // Not to wait for whoever writes into a pipe.
@@ -40,6 +41,24 @@ absl::StatusOr<int> OpenVideoFile(const std::filesystem::path& file) {
   close(descriptor);
   return absl::InvalidArgumentError(
       absl::StrCat(file.string(), ": is no regular file; give a video file"));
+}
+
+/// What is read there is `text`, and then it ends: for what nobody else is to see.
+absl::StatusOr<int> Whispered(const std::string& text) {
+  int ends[2] = {-1, -1};
+  if (text.size() > kMostAddressBytes) {
+    return absl::InvalidArgumentError(absl::StrCat("--source: an address of ", text.size(),
+                                                   " bytes; at most ", kMostAddressBytes));
+  }
+  if (pipe2(ends, O_CLOEXEC) != 0) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("saccade-decode: no pipe to it (", std::strerror(errno), ")"));
+  }
+  const ssize_t written = write(ends[1], text.data(), text.size());  // fits into any pipe
+  close(ends[1]);
+  if (written == static_cast<ssize_t>(text.size())) return ends[0];
+  close(ends[0]);
+  return absl::InternalError("saccade-decode: its address could not be written");
 }
 
 std::filesystem::path DecoderProgram() {
@@ -134,16 +153,13 @@ absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::StartPackets(
 
 absl::StatusOr<std::unique_ptr<DecoderProcess>> DecoderProcess::Start(const VideoInput& input,
                                                                       std::int64_t after_ns) {
-  int file = -1;
-  if (!input.file.empty()) {
-    const absl::StatusOr<int> opened = OpenVideoFile(input.file);
-    if (!opened.ok()) return opened.status();
-    file = *opened;
-  }
+  const bool stream = input.file.empty();
+  const absl::StatusOr<int> in = stream ? Whispered(input.url) : OpenVideoFile(input.file);
+  if (!in.ok()) return in.status();
   std::vector<std::string> words = {"saccade-decode", "--after", absl::StrCat(after_ns)};
-  if (file < 0) words.insert(words.end(), {"--url", input.url});
-  const absl::StatusOr<Spawned> spawned = SpawnDecoder(words, file);
-  if (file >= 0) close(file);
+  if (stream) words.emplace_back("--stream");
+  const absl::StatusOr<Spawned> spawned = SpawnDecoder(words, *in);
+  close(*in);
   if (!spawned.ok()) return spawned.status();
   return std::unique_ptr<DecoderProcess>(new DecoderProcess(spawned->pid, spawned->pipe, -1));
 }

@@ -1,15 +1,18 @@
 // Another certificate while people watch: who comes sees the new one, who is there sees nothing.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openssl/ssl.h>
 
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "saccade/v1/session.grpc.pb.h"
 #include "server/identity/certificate.hpp"
 #include "tests/integration/identity/guarded_server.hpp"
+#include "tests/integration/identity/https_client.hpp"
 #include "tests/integration/identity/tls_socket.hpp"
 
 namespace saccade::testing {
@@ -75,6 +78,36 @@ TEST(Renewal, OfTheOwnCertificateDisturbsNoStream) {
   context.TryCancel();
   watch.join();
   reader->Finish();
+}
+
+// In its last month, or moved away by hand: who trusts the new root gets in, also by what this
+// machine keeps for itself.
+TEST(Renewal, OfTheAuthorityIsTakenUpByBothPortsTheTrustPageAndTheOwner) {
+  GuardedServer server;
+  const std::string folder = server.data_dir() + "/tls/";
+  for (const char* name : {"authority.pem", "authority.key"})
+    std::filesystem::remove(folder + name);
+  std::string root;
+  for (int tries = 0; tries < 150 && root.empty(); ++tries) {
+    std::this_thread::sleep_for(milliseconds(200));
+    std::ifstream in(folder + "authority.pem");
+    root.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  ASSERT_NE(root, server.root_pem());
+  for (const int port : {server.grpc_port(), server.http_port()}) {
+    EXPECT_TRUE(WaitForOther("", port, root)) << port;
+  }
+  const std::string said = "of a new authority: everybody has to trust it anew";
+  for (int tries = 0; tries < 50 && server.process().err().find(said) == std::string::npos; ++tries)
+    std::this_thread::sleep_for(milliseconds(100));
+  EXPECT_THAT(server.process().err(), ::testing::HasSubstr(said));
+  HttpsRequest page;
+  page.port = server.http_port();
+  page.root_pem = root;
+  page.target = "/trust/saccade-root.pem";
+  EXPECT_EQ(Send(page).body, root);
+  std::ifstream owner(server.data_dir() + "/owner.json");
+  EXPECT_EQ(nlohmann::json::parse(owner).at("root"), root);
 }
 
 TEST(Renewal, OfAGivenCertificateComesWithItsFiles) {

@@ -8,6 +8,7 @@
 #include <deque>
 #include <thread>
 
+#include "grpc/health/v1/health.grpc.pb.h"
 #include "saccade/v1/annotation.grpc.pb.h"
 #include "server/identity/role_table.hpp"
 #include "tests/integration/attack/socket.hpp"
@@ -40,8 +41,7 @@ TEST(Limits, EveryMethodIsRefusedBeforeItsMessageIsParsed) {
     const std::string message = row.what == "Health/Watch" ? "" : kNonsense;
     const Outcome grpc = server.Call(FullName(row.what), message, pass);
     EXPECT_EQ(grpc.code, kResourceExhausted) << row.what << ": " << grpc.message;
-    EXPECT_THAT(grpc.message,
-                HasSubstr("more than 0.01 calls a second with this invite: try again"));
+    EXPECT_THAT(grpc.message, HasSubstr("more than 0.01 calls a second with this pass: try again"));
     const HttpsReply web =
         CallOverWeb(server.http_port(), server.root_pem(), FullName(row.what), kNonsense, pass);
     EXPECT_EQ(web.grpc_status, kResourceExhausted) << row.what << ": " << web.head;
@@ -55,7 +55,7 @@ TEST(Limits, EveryMethodIsRefusedBeforeItsMessageIsParsed) {
   const HttpsReply refused = Send(page);
   EXPECT_EQ(refused.http_status, 429);
   EXPECT_THAT(refused.head, HasSubstr("Retry-After: "));
-  EXPECT_THAT(refused.body, HasSubstr("0.01 calls a second with this invite: try again in"));
+  EXPECT_THAT(refused.body, HasSubstr("0.01 calls a second with this pass: try again in"));
   // Nobody else pays for it.
   EXPECT_EQ(server.Call("saccade.v1.AccessService/GetAccess", "", "").code, 0);
   page.token.clear();
@@ -69,7 +69,7 @@ TEST(Limits, BytesCountAsWell) {
   EXPECT_NE(server.Call(ping, std::string(100'000, '\xff'), pass).code, kResourceExhausted);
   const Outcome next = server.Call(ping, "", pass);
   EXPECT_EQ(next.code, kResourceExhausted);
-  EXPECT_THAT(next.message, HasSubstr("more than 1000 bytes a second with this invite"));
+  EXPECT_THAT(next.message, HasSubstr("more than 1000 bytes a second with this pass"));
   EXPECT_EQ(server.Call(ping, "", server.owner_token()).code, 0);
 }
 
@@ -100,6 +100,43 @@ TEST(Limits, SessionsOfOnePass) {
   EXPECT_EQ(fourth.code, kResourceExhausted);
   EXPECT_THAT(fourth.message, HasSubstr("3 of this invite are in use"));
   EXPECT_FALSE(server.Join(server.PassOf(v1::ACCESS_ROLE_PILOT)).empty());
+}
+
+// A link that is redeemed many times has no more than a room full of people.
+TEST(Limits, OfEverybodyWhoCameByOneInvite) {
+  GuardedServer server({.limits = "invite_requests_per_s = 0.01\ninvite_sessions = 3\n"});
+  const std::string invite = server.Invite(v1::ACCESS_ROLE_PILOT, nullptr, 3);
+  std::string first, second;
+  ASSERT_EQ(server.Redeem(invite, &first).code, 0);
+  ASSERT_EQ(server.Redeem(invite, &second).code, 0);
+  const std::string ping = "saccade.v1.SessionService/Ping";
+  EXPECT_EQ(server.Call(ping, "", first).code, 0);
+  for (const std::string& pass : {first, second}) {
+    const Outcome refused = server.Call(ping, "", pass);
+    EXPECT_EQ(refused.code, kResourceExhausted);
+    EXPECT_THAT(refused.message,
+                HasSubstr("more than 0.01 calls a second by everybody with this invite: try"));
+    const HttpsReply web = CallOverWeb(server.http_port(), server.root_pem(), ping, "", pass);
+    EXPECT_EQ(web.grpc_status, kResourceExhausted);
+  }
+  EXPECT_EQ(server.Call(ping, "", server.PassOf(v1::ACCESS_ROLE_PILOT)).code, 0)
+      << "another invite";
+}
+
+TEST(Limits, BytesAndSessionsOfEverybodyWhoCameByOneInvite) {
+  GuardedServer server({.limits = "invite_bytes_per_s = 1000\ninvite_sessions = 3\n"});
+  const std::string invite = server.Invite(v1::ACCESS_ROLE_PILOT, nullptr, 4);
+  std::string passes[4];
+  for (std::string& pass : passes) ASSERT_EQ(server.Redeem(invite, &pass).code, 0);
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(server.Join(passes[i]).empty());
+  const Outcome fourth = server.Call("saccade.v1.SessionService/Join", "", passes[3]);
+  EXPECT_EQ(fourth.code, kResourceExhausted);
+  EXPECT_THAT(fourth.message, HasSubstr("3 of this invite are in use"));
+  EXPECT_FALSE(server.Join(server.PassOf(v1::ACCESS_ROLE_PILOT)).empty());
+  const std::string ping = "saccade.v1.SessionService/Ping";
+  EXPECT_NE(server.Call(ping, std::string(100'000, '\xff'), passes[0]).code, kResourceExhausted);
+  EXPECT_THAT(server.Call(ping, "", passes[1]).message,
+              HasSubstr("more than 1000 bytes a second by everybody with this invite"));
 }
 
 TEST(Limits, AnnotationsOfOneSession) {
@@ -154,6 +191,74 @@ TEST(Limits, ConnectionsOfOneAddressAndHowOftenItMakesThem) {
   GuardedServer often({.limits = "this_machine = true\naddress_connections_per_s = 1\n"});
   std::deque<Socket> quick;
   EXPECT_LE(OpenOf(quick, often.http_port(), 20), 8) << "six seconds' worth at once";
+}
+
+/// One Health/Watch, and what came of it.
+struct HealthWatch {
+  HealthWatch(const std::shared_ptr<grpc::Channel>& channel, const std::string& pass) {
+    context.AddMetadata("authorization", "Bearer " + pass);
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(20));
+    stub = grpc::health::v1::Health::NewStub(channel);
+    reader = stub->Watch(&context, {});
+    serving = reader->Read(&response) && response.status() == response.SERVING;
+  }
+  /// Waits for its end.
+  grpc::Status End() {
+    while (reader->Read(&response)) {
+    }
+    return reader->Finish();
+  }
+  grpc::ClientContext context;
+  std::unique_ptr<grpc::health::v1::Health::Stub> stub;
+  std::unique_ptr<grpc::ClientReader<grpc::health::v1::HealthCheckResponse>> reader;
+  grpc::health::v1::HealthCheckResponse response;
+  bool serving = false;
+};
+
+TEST(Health, WatchIsForFourOfAPassAndEndsWithIt) {
+  GuardedServer server;
+  std::string invite_id;
+  const std::string pass = server.PassOf(v1::ACCESS_ROLE_VIEWER, &invite_id);
+  std::deque<HealthWatch> watches;
+  for (int i = 0; i < 4; ++i) {
+    watches.emplace_back(server.channel(), pass);
+    EXPECT_TRUE(watches.back().serving) << i;
+  }
+  HealthWatch fifth(server.channel(), pass);
+  EXPECT_FALSE(fifth.serving);
+  const grpc::Status refused = fifth.End();
+  EXPECT_EQ(refused.error_code(), kResourceExhausted);
+  EXPECT_THAT(refused.error_message(), HasSubstr("you watch four times already"));
+  HealthWatch other(server.channel(), server.PassOf(v1::ACCESS_ROLE_VIEWER));
+  EXPECT_TRUE(other.serving) << "nobody else's";
+
+  // One that goes makes room.
+  watches.front().context.TryCancel();
+  watches.front().End();
+  watches.pop_front();
+  bool again = false;
+  for (int tries = 0; tries < 50 && !again; ++tries) {
+    std::this_thread::sleep_for(milliseconds(20));
+    HealthWatch probe(server.channel(), pass);
+    again = probe.serving;
+    probe.context.TryCancel();
+    probe.End();
+  }
+  EXPECT_TRUE(again);
+
+  const auto revoked = std::chrono::steady_clock::now();
+  ASSERT_EQ(server.Revoke(invite_id).code, 0);
+  for (HealthWatch& watch : watches) {
+    const grpc::Status ended = watch.End();
+    EXPECT_EQ(ended.error_code(), kUnauthenticated);
+    EXPECT_THAT(ended.error_message(), HasSubstr("this invite was revoked"));
+  }
+  const double ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - revoked).count();
+  EXPECT_LT(ms, 1000);
+  EXPECT_EQ(server.Call("grpc.health.v1.Health/Watch", "", pass).code, kUnauthenticated);
+  other.context.TryCancel();
+  EXPECT_EQ(other.End().error_code(), grpc::StatusCode::CANCELLED) << "and went on until then";
 }
 
 TEST(Health, CheckIsOpenAndWatchAndReflectionAreNot) {

@@ -34,6 +34,8 @@ enum Least { kAnyone, kViewer, kAnnotator, kPilot, kWearer, kOwner };
 const std::map<std::string, Least>& Promised() {
   static const std::map<std::string, Least> rows = {{"AccessService/GetAccess", kAnyone},
                                                     {"AccessService/Redeem", kAnyone},
+                                                    {"AccessService/BeginSignIn", kAnyone},
+                                                    {"AccessService/FinishSignIn", kAnyone},
                                                     {"AccessService/CreateInvite", kOwner},
                                                     {"AccessService/ListInvites", kOwner},
                                                     {"AccessService/ListAudit", kOwner},

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <future>
 #include <thread>
 
@@ -47,6 +48,12 @@ TEST_F(Rtsp, LiveFramesComeOnTheMonotonicClockAndOutliveTheirDecoder) {
   ASSERT_TRUE(source.ok()) << source.status();
   EXPECT_EQ((*source)->info().camera->width(), 320);
   EXPECT_EQ((*source)->info().uri, "rtsp://localhost:" + port_ + "/cam") << "everybody reads it";
+  // Nor in what every account of the machine, or this one, sees of the decoder.
+  for (const char* words : {"cmdline", "environ"}) {
+    std::ifstream in("/proc/" + std::to_string((*source)->decoder_pid()) + "/" + words);
+    const std::string text((std::istreambuf_iterator<char>(in)), {});
+    EXPECT_EQ(text.find("secret"), std::string::npos) << words << ": " << text;
+  }
   std::vector<Timestamp> times;
   for (int i = 0; i < 90; ++i) {
     const auto frame = (*source)->Next();
@@ -117,6 +124,21 @@ TEST_F(Rtsp, IsRecordedUntilCtrlCAndOpensAsADataSet) {
   ASSERT_TRUE(source.ok()) << source.status();
   EXPECT_GT((*source)->info().frame_count, 5u);
   EXPECT_TRUE((*source)->Next()->has_value());
+}
+
+TEST(Record, APhoneIsRefusedWithWhatToDoInstead) {
+  const TemporaryFolder folder;
+  for (const char* command : {"record", "calibrate-camera"}) {
+    std::vector<std::string> words = {SACCADE_PROGRAM, command, "--source",
+                                      "phone:",        "--out", folder / command};
+    if (std::string(command) == "calibrate-camera") {
+      words.insert(words.end(), {"--board", "9x6", "--square", "0.025"});
+    }
+    const RunResult result = RunProgram(words);
+    EXPECT_NE(result.exit_code, 0);
+    EXPECT_THAT(result.err, HasSubstr("film with the phone's own camera")) << command;
+    EXPECT_THAT(result.err, HasSubstr("--source file:VIDEO")) << command;
+  }
 }
 
 }  // namespace

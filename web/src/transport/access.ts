@@ -1,6 +1,13 @@
-import { type Client, createClient, type Interceptor } from '@connectrpc/connect';
+import {
+  type Client,
+  Code,
+  ConnectError,
+  createClient,
+  type Interceptor,
+} from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { AccessService } from '../gen/saccade/v1/access_pb';
+import type { Return } from './sign_in';
 
 type PassStorage = Pick<Storage, 'getItem' | 'setItem' | 'removeItem'>;
 
@@ -27,8 +34,8 @@ export const bearing =
   };
 
 /**
- * What lets this browser in. An invite is redeemed once; the pass that comes of it is kept for this
- * tab, and for those that are opened without an invite later.
+ * What lets this browser in. An invite is redeemed once, and so is the code of a sign-in; the pass that
+ * comes of it is kept for this tab, and for those that are opened without either later.
  */
 export class Access {
   private pass: Pass | undefined;
@@ -40,6 +47,7 @@ export class Access {
     private readonly tab: PassStorage,
     private readonly browser: Pick<Storage, 'getItem' | 'setItem'>,
     client?: Client<typeof AccessService>,
+    private signIn?: Return,
   ) {
     const interceptors = [bearing(() => this.token)];
     this.client =
@@ -61,6 +69,7 @@ export class Access {
   async enter(signal: AbortSignal, displayName = '', waiting?: () => void): Promise<void> {
     const { invite } = this;
     if (invite !== undefined) await this.redeem(invite, displayName, signal);
+    else if (this.signIn !== undefined) await this.finish(this.signIn, signal);
     if (this.pass === undefined) return;
     for (;;) {
       const told = await this.client.getAccess({}, { signal, timeoutMs: 5000 });
@@ -76,7 +85,21 @@ export class Access {
     const request = { invite, displayName };
     const { token } = await this.client.redeem(request, { signal, timeoutMs: 5000 });
     this.invite = undefined;
-    this.pass = { inviteId: idOf(invite), token };
+    this.keep({ inviteId: idOf(invite), token });
+  }
+
+  private async finish(signIn: Return, signal: AbortSignal): Promise<void> {
+    const { state, code, codeVerifier, problem } = signIn;
+    this.pass = undefined; // who signs in means that
+    if (problem) throw new ConnectError(problem, Code.Unauthenticated);
+    const request = { state, code, codeVerifier };
+    this.signIn = undefined; // a code is taken once, whatever comes of it
+    const { token } = await this.client.finishSignIn(request, { signal, timeoutMs: 20_000 });
+    this.keep({ inviteId: '', token });
+  }
+
+  private keep(pass: Pass): void {
+    this.pass = pass;
     const kept = JSON.stringify(this.pass);
     for (const storage of [this.tab, this.browser]) {
       try {

@@ -6,8 +6,10 @@ import { Session, type SessionOptions } from '../session/session';
 import { Tabs } from '../session/tabs';
 import { Access, inviteOf } from '../transport/access';
 import { createClients } from '../transport/clients';
+import { type Return, takeReturn } from '../transport/sign_in';
 import { h, letGoOfButtons, storage, tabStorage } from './dom';
 import { Player } from './player';
+import { SignInNotice } from './sign_in_notice';
 import { WaitingRoom } from './waiting_room';
 
 /** What a page shows of a session. */
@@ -21,10 +23,21 @@ export function startPage(
   options: Pick<SessionOptions, 'role' | 'view' | 'name' | 'topics'>,
   makePage: (session: Session, player: Player, token: () => string) => Page,
 ): void {
-  const access = new Access(location.origin, takeInvite(), tabStorage(), storage());
+  const signIn = takeSignIn();
+  const access = new Access(
+    location.origin,
+    takeInvite(),
+    tabStorage(),
+    storage(),
+    undefined,
+    signIn,
+  );
   const token = (): string => access.token;
-  const enter: SessionOptions['enter'] = (signal, name, waiting) =>
-    access.enter(signal, name, waiting);
+  const enter: SessionOptions['enter'] = async (signal, name, waiting) => {
+    const other = signIn !== undefined && !access.token && signIn.path !== location.pathname;
+    await access.enter(signal, name, waiting);
+    if (other && access.token) location.replace(signIn.path); // the page that went to sign in
+  };
   const player = new Player();
   const kept = new KeptSession(tabStorage(), options.role, !reloaded());
   const tabs = new Tabs(new BroadcastChannel('saccade'), newUuid(), openedMs(tabStorage()));
@@ -61,11 +74,21 @@ function takeInvite(): string | undefined {
   return invite;
 }
 
+/** What the firm's provider sent back; it is gone from the address then. */
+function takeSignIn(): Return | undefined {
+  const back = takeReturn(location.search, tabStorage());
+  if (back !== undefined) history.replaceState(history.state, '', location.pathname);
+  return back;
+}
+
 /** What a page shows beside its own: that nothing is protected, and who wants to come in. */
 async function greet(access: Access, session: Session): Promise<void> {
   const room = new WaitingRoom(access, session);
   document.body.append(room.element);
   room.start();
+  const signIn = new SignInNotice(access, session);
+  document.body.append(signIn.element);
+  signIn.start();
   const told = await access.client.getAccess({}, { timeoutMs: 5000 }).catch(() => undefined);
   if (!told?.insecure) return;
   const words =

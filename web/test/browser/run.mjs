@@ -1,11 +1,12 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze|dots|person|invite|layout|tools|wear|waiting|talk]   (gaze: the turning of the head; dots: measured features
+//        [--part page|gaze|dots|person|invite|layout|tools|wear|waiting|talk|oidc]   (gaze: the turning of the head; dots: measured features
 //        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
 //        from another address than loopback where this may make a network namespace; wear: a phone as the
 //        camera, and an expert, each in a network of its own; layout: sizes of
 //        window and barriers; tools: two people and what they draw, point at and change; waiting: who comes waits to be let in;
-//        talk: voices, messages, the pause of the picture, the first task; page: everything else)
+//        talk: voices, messages, the pause of the picture, the first task; oidc: a firm's people sign in;
+//        page: everything else)
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -49,6 +50,7 @@ const PARTS = {
   wear: async () => (await import('./wear.mjs')).runWear,
   waiting: async () => (await import('./waiting.mjs')).runWaiting,
   talk: async () => (await import('./talk.mjs')).runTalk,
+  oidc: async () => (await import('./oidc.mjs')).runOidc,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);
 const runChecks = await PARTS[options.part]();

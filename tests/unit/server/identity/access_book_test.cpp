@@ -256,7 +256,8 @@ TEST(AccessBook, AnOlderFileGoesOn) {
     for (const char* step :
          {"ALTER TABLE invites DROP COLUMN waits", "ALTER TABLE passes DROP COLUMN display_name",
           "ALTER TABLE passes DROP COLUMN since_unix_s", "ALTER TABLE passes DROP COLUMN state",
-          "PRAGMA user_version = 1"}) {
+          "ALTER TABLE passes DROP COLUMN expires_unix_s",
+          "ALTER TABLE passes DROP COLUMN proof_sha256", "PRAGMA user_version = 1"}) {
       ASSERT_TRUE(database->Execute(step).ok()) << step;
     }
   }

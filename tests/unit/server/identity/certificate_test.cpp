@@ -145,6 +145,33 @@ TEST(ServerIdentity, IsRenewedWhenItExpiresOrANameIsNewAndTheRootStays) {
   EXPECT_EQ(elsewhere->root_pem, first->root_pem);
 }
 
+TEST(ServerIdentity, AnAuthorityIsReplacedInItsLastMonthAndThatIsSaidAMonthBefore) {
+  const TemporaryFolder folder;
+  const auto first = EnsureServerIdentity(folder.path(), kNames, kNow);
+  ASSERT_TRUE(first.ok());
+  const std::int64_t end = InspectCertificate(first->root_pem)->not_after_unix_s;
+  EXPECT_EQ(ExpiryWarning(*first, end - 61 * kDay_s), "");
+  EXPECT_THAT(ExpiryWarning(*first, end - 59 * kDay_s),
+              HasSubstr("in 29 days a new one is made, which everybody has to trust anew"));
+  const auto kept = EnsureServerIdentity(folder.path(), kNames, end - 31 * kDay_s);
+  EXPECT_EQ(kept->root_pem, first->root_pem);
+  const auto next = EnsureServerIdentity(folder.path(), kNames, end - 29 * kDay_s);
+  ASSERT_TRUE(next.ok());
+  EXPECT_NE(next->root_pem, first->root_pem);
+  EXPECT_NE(next->root_sha256, first->root_sha256);
+  EXPECT_TRUE(SignedBy(next->chain_pem, next->root_pem));
+}
+
+TEST(ServerIdentity, TheEndOfAGivenCertificateIsSaidTwoWeeksBefore) {
+  const auto authority = MakeAuthority("Somebody's");
+  const auto pair = MakeServerCertificate(*authority, kNames);
+  const ServerIdentity given{pair->certificate_pem, pair->key_pem, "", "", {}};
+  const std::int64_t end = InspectCertificate(given.chain_pem)->not_after_unix_s;
+  EXPECT_EQ(ExpiryWarning(given, end - 15 * kDay_s), "");
+  EXPECT_THAT(ExpiryWarning(given, end - 13 * kDay_s), HasSubstr("in 13 days; put a new one"));
+  EXPECT_THAT(ExpiryWarning(given, end + 1), HasSubstr("nobody can connect; put a new one"));
+}
+
 TEST(ServerIdentity, ADamagedAuthorityIsSaidAndNotReplaced) {
   const TemporaryFolder folder;
   ASSERT_TRUE(EnsureServerIdentity(folder.path(), kNames, kNow).ok());

@@ -9,6 +9,7 @@ namespace {
 
 constexpr Timestamp kSecond = 1'000'000'000;
 const ConnectionLimits kLimits{.of_address = 4,
+                               .of_network = 6,
                                .unheard_of_address = 2,
                                .new_of_address = {1, 3},
                                .trusted_proxy = "192.0.2.1"};
@@ -17,7 +18,8 @@ TEST(ConnectionGate, AnAddressHasItsShareAndHearsWhenToComeAgain) {
   ConnectionGate gate(kLimits);
   const std::string peer = "ipv4:192.0.2.7";
   EXPECT_TRUE(gate.Admit(peer, {1000, 3, 1}).ok());
-  for (const ConnectionCounts& full : {ConnectionCounts{4, 4, 0}, ConnectionCounts{3, 3, 2}}) {
+  for (const ConnectionCounts& full :
+       {ConnectionCounts{4, 4, 0}, ConnectionCounts{3, 3, 2}, ConnectionCounts{9, 3, 0, 6}}) {
     const absl::Status status = gate.Admit(peer, full);
     EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
     EXPECT_GT(RetryAfterOf(status), 0);

@@ -40,6 +40,14 @@ TEST(PeerAddress, OfForwardedForOnlyWhatTheProxyWroteCounts) {
   }
 }
 
+TEST(PeerAddress, NeighboursAreOneNetwork) {
+  const auto network = [](const char* address) { return NetworkKey(PeerKey(address)); };
+  EXPECT_EQ(network("203.0.113.7"), network("203.0.113.250"));
+  EXPECT_NE(network("203.0.113.7"), network("203.0.114.7"));
+  EXPECT_EQ(network("2001:db8:1:2::5"), network("2001:db8:1:ffff::9"));
+  EXPECT_NE(network("2001:db8:1:2::5"), network("2001:db8:2:2::5"));
+}
+
 TEST(PeerAddress, ATokenStandsBehindBearer) {
   EXPECT_EQ(TokenIn("Bearer p1.secret"), "p1.secret");
   EXPECT_EQ(TokenIn("bearer  p1.secret "), "p1.secret");
