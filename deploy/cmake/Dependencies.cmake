@@ -30,10 +30,12 @@ pkg_check_modules(TextDrawing REQUIRED IMPORTED_TARGET freetype2 harfbuzz fribid
 
 # OpenCV by module: libopencv-dev, which holds OpenCVConfig.cmake, would pull VTK and videoio in.
 find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
-foreach(module core imgproc imgcodecs calib3d features2d flann video)
+foreach(module core imgproc imgcodecs calib3d features2d flann video aruco)
   find_library(OPENCV_${module}_LIBRARY opencv_${module} REQUIRED)
   add_library(OpenCV::${module} UNKNOWN IMPORTED)
   set_target_properties(OpenCV::${module} PROPERTIES
     IMPORTED_LOCATION ${OPENCV_${module}_LIBRARY}
     INTERFACE_INCLUDE_DIRECTORIES ${OPENCV_INCLUDE_DIR})
 endforeach()
+# Square markers.
+find_package(apriltag CONFIG REQUIRED)

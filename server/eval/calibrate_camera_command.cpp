@@ -84,7 +84,7 @@ absl::Status Collect(FrameSource& source, const BoardPattern& pattern,
     const Timestamp at_ns = (*frame)->capture_time_ns;
     if (!begin_ns) begin_ns = at_ns;
     if (arguments.seconds > 0 && Seconds(at_ns - *begin_ns) > arguments.seconds) break;
-    BoardView view{(*frame)->id, at_ns, FindBoard((*frame)->grey, pattern)};
+    BoardView view{(*frame)->id, at_ns, FindBoard((*frame)->grey, pattern), pattern.Points()};
     std::optional<ViewPicker::Verdict> verdict;
     if (!view.corners.empty()) verdict = picker.Offer(view);
     progress.Say(**frame, verdict);
@@ -151,14 +151,14 @@ absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments) {
   if (!source.ok()) return source.status();
   const CameraIntrinsics& camera = (*source)->info().camera->intrinsics();
   const cv::Size picture(camera.width, camera.height);
-  ViewPicker picker(*pattern, picture);
+  ViewPicker picker(picture);
   {
     const std::jthread watch = signals.Watch(**source);
     if (absl::Status seen = Collect(**source, *pattern, arguments, picker); !seen.ok()) return seen;
   }
   signals.Release();  // the fit takes minutes, and may be given up
   const absl::StatusOr<LensReport> report =
-      Calibrate(arguments.source, picker, *pattern, picture, model);
+      Calibrate(arguments.source, picker, pattern->Words(), picture, model);
   if (!report.ok()) return report.status();
   std::cout << (arguments.json ? ReportJson(*report).dump(2) + "\n" : ReportText(*report));
   if (absl::Status enough = Judge(*report); !enough.ok()) return enough;

@@ -56,6 +56,21 @@ struct CalibrateArguments {
   double seconds = 0;  // end after so long; 0: with the source, or when nothing is missing
   bool json = false;
 };
+struct MarkersArguments {
+  std::filesystem::path images, out;
+  std::string detector;               // apriltag, aruco
+  std::vector<std::string> families;  // none: what can hardly be taken for something else
+  int border_bits = 0;                // of the code's cells; 0: 1, and for a sheet what reads more
+  std::string grid;  // aprilgrid.yaml, or 6x6:0.088:0.3; empty: the folder's own; "none"
+};
+struct CalibrateTargetArguments {
+  std::filesystem::path images;
+  std::string target;   // chessboard:9x6:0.04, aprilgrid:6x6:0.088:0.3, aprilgrid:FILE
+  std::string lens;     // empty: the one that explains more
+  int border_bits = 0;  // as above
+  std::filesystem::path out;
+  bool json = false;
+};
 struct PoseGraphArguments {
   std::filesystem::path in, out;
   std::string cost = "chordal";  // or chi2
@@ -77,6 +92,12 @@ absl::Status RecordCommand(const RenderArguments& arguments);
 /// Finds a camera's lens from a source that shows a chessboard and writes it as camera.yaml, with
 /// sigmas; refuses where the views do not determine it.
 absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments);
+/// Finds square markers in the pictures of a folder; DIR/detections.csv: file, family, id, four
+/// corners [px], four variances [px^2].
+absl::Status MarkersCommand(const MarkersArguments& arguments);
+/// Finds a lens from the pictures of a folder that show a board or a sheet of tags, and writes it
+/// as camera.yaml.
+absl::Status CalibrateTargetCommand(const CalibrateTargetArguments& arguments);
 /// Whether the source is paced by the world, and ends when somebody ends it.
 bool IsLive(absl::string_view uri);
 /// InvalidArgument with the remedy: `uri` is a phone's, which only a server receives.

@@ -160,6 +160,46 @@ void AddCalibrateCamera(CLI::App& app, CalibrateArguments& arguments) {
   calibrate->add_flag("--json", arguments.json, "Print report and progress as JSON");
 }
 
+void AddMarkers(CLI::App& app, MarkersArguments& arguments) {
+  CLI::App* markers = app.add_subcommand("markers", "Find square markers in pictures");
+  markers->add_option("--images", arguments.images, "Folder of pictures")->required();
+  markers->add_option("--detector", arguments.detector, "apriltag or aruco")
+      ->check(CLI::IsMember({"apriltag", "aruco"}))
+      ->required();
+  markers
+      ->add_option("--family", arguments.families,
+                   "apriltag36h11, aruco_4x4_50, ...; may be repeated; else those that can hardly "
+                   "be taken for something else")
+      ->take_all();
+  markers
+      ->add_option("--border-bits", arguments.border_bits,
+                   "Width of the black border in cells; else 1, and for a sheet what reads more")
+      ->check(CLI::Range(1, 4));
+  markers->add_option("--grid", arguments.grid,
+                      "Kalibr's aprilgrid.yaml, or 6x6:0.088:0.3, whose tags are searched for "
+                      "where they must be; else the folder's aprilgrid.yaml; none for neither");
+  markers->add_option("--out", arguments.out, "Folder for detections.csv")->required();
+}
+
+void AddCalibrateTarget(CLI::App& app, CalibrateTargetArguments& arguments) {
+  CLI::App* calibrate =
+      app.add_subcommand("calibrate", "Find a camera's lens from pictures of a target");
+  calibrate->add_option("--images", arguments.images, "Folder of pictures")->required();
+  calibrate->add_option("--target", arguments.target,
+                        "chessboard:9x6:0.04, aprilgrid:6x6:0.088:0.3 or aprilgrid:FILE.yaml; else "
+                        "the folder's aprilgrid.yaml");
+  calibrate
+      ->add_option("--lens", arguments.lens,
+                   "Model; else the one that explains the pictures better")
+      ->check(CLI::IsMember({"brown_conrady", "kannala_brandt"}));
+  calibrate
+      ->add_option("--border-bits", arguments.border_bits,
+                   "Width of a tag's black border in cells; else what reads more")
+      ->check(CLI::Range(1, 4));
+  calibrate->add_option("--out", arguments.out, "The camera.yaml to write, a new file")->required();
+  calibrate->add_flag("--json", arguments.json, "Print the report as JSON");
+}
+
 /// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell
 /// starts what is in the background deaf to SIGINT, and a mask of blocked signals is inherited.
 void HearSignals() {
@@ -205,6 +245,8 @@ int Main(int argc, char** argv) {
   RenderArguments render, record;
   CalibrateArguments calibrate;
   PoseGraphArguments graph;
+  MarkersArguments markers;
+  CalibrateTargetArguments target;
   AddRun(app, run);
   AddScore(app, score);
   AddSim(app, sim);
@@ -212,6 +254,8 @@ int Main(int argc, char** argv) {
   AddRecord(app, record);
   AddCalibrateCamera(app, calibrate);
   AddPoseGraph(app, graph);
+  AddMarkers(app, markers);
+  AddCalibrateTarget(app, target);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -225,6 +269,8 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("record")) status = RecordCommand(record);
   if (app.got_subcommand("calibrate-camera")) status = CalibrateCameraCommand(calibrate);
   if (app.got_subcommand("posegraph")) status = PoseGraphCommand(graph);
+  if (app.got_subcommand("markers")) status = MarkersCommand(markers);
+  if (app.got_subcommand("calibrate")) status = CalibrateTargetCommand(target);
   return status.ok() ? 0 : Fail(status);
 }
 

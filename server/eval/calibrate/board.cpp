@@ -25,6 +25,10 @@ std::vector<cv::Point3d> BoardPattern::Points() const {
   return points;
 }
 
+std::string BoardPattern::Words() const {
+  return absl::StrCat("board of ", columns, " x ", rows, " corners, ", square_m, " m");
+}
+
 absl::StatusOr<BoardPattern> ParseBoard(const std::string& board, double square_m) {
   const std::vector<std::string> sides = absl::StrSplit(board, absl::ByAnyChar("xX"));
   BoardPattern pattern;

@@ -19,6 +19,8 @@ struct BoardPattern {
   cv::Size size() const { return {columns, rows}; }
   /// Corner (i, j) at entry j * columns + i, in the plane z = 0 [m].
   std::vector<cv::Point3d> Points() const;
+  /// "board of 9 x 6 corners, 0.025 m".
+  std::string Words() const;
 };
 
 /// "9x6" and the side of a square. InvalidArgument: not that, fewer than 3 corners along a side, or
@@ -29,7 +31,8 @@ absl::StatusOr<BoardPattern> ParseBoard(const std::string& board, double square_
 struct BoardView {
   std::uint64_t frame = 0;
   Timestamp time_ns = 0;
-  std::vector<cv::Point2d> corners;  // [px], as BoardPattern::Points()
+  std::vector<cv::Point2d> corners;  // [px]
+  std::vector<cv::Point3d> points;   // what they are of, in the board's plane z = 0 [m]
 };
 
 /// The board's corners to a few hundredths of a pixel; nothing if it is not wholly in view. Which

@@ -12,7 +12,7 @@
 namespace saccade {
 namespace {
 
-using Corners = std::vector<const std::vector<cv::Point2d>*>;
+using Views = std::vector<const BoardView*>;
 
 constexpr double kStartHuber_px = 5, kLeastHuber_px = 0.1;
 constexpr int kStartIterations = 20, kIterations = 60, kRounds = 6;
@@ -31,16 +31,14 @@ double Rms(const Eigen::VectorXd& residuals) {
 }
 
 /// Focal lengths to begin with: from the homographies, and across what lenses there are.
-std::vector<double> FocalGuesses(const Corners& views, const BoardPattern& pattern,
-                                 cv::Size picture) {
+std::vector<double> FocalGuesses(const Views& views, cv::Size picture) {
   std::vector<double> guesses;
   for (const double share : {0.3, 0.45, 0.7, 1.1, 1.8}) guesses.push_back(share * picture.width);
   std::vector<std::vector<cv::Point3f>> points;
   std::vector<std::vector<cv::Point2f>> corners;
-  const std::vector<cv::Point3d> board = pattern.Points();
-  for (const auto* view : views) {
-    points.emplace_back(board.begin(), board.end());
-    corners.emplace_back(view->begin(), view->end());
+  for (const BoardView* view : views) {
+    points.emplace_back(view->points.begin(), view->points.end());
+    corners.emplace_back(view->corners.begin(), view->corners.end());
   }
   const cv::Mat matrix = cv::initCameraMatrix2D(points, corners, picture, 1.0);
   const double focal = matrix.at<double>(0, 0);
@@ -49,18 +47,17 @@ std::vector<double> FocalGuesses(const Corners& views, const BoardPattern& patte
 }
 
 /// The best beginning: focal length and first coefficient alone are free, the centre in the middle.
-LensProblem::State Begin(const LensProblem& problem, const Corners& views,
-                         const BoardPattern& pattern, cv::Size picture) {
+LensProblem::State Begin(const LensProblem& problem, const Views& views, cv::Size picture) {
   LensProblem::State best;
   best.cost = kNoCost;
   std::vector<bool> some(problem.parameters(), false);
   some[0] = some[1] = some[4] = true;
-  for (const double focal : FocalGuesses(views, pattern, picture)) {
+  for (const double focal : FocalGuesses(views, picture)) {
     LensProblem::State state;
     state.lens = Eigen::VectorXd::Zero(problem.parameters());
     state.lens.head<4>() << focal, focal, 0.5 * (picture.width - 1), 0.5 * (picture.height - 1);
     bool posed = true;
-    for (const auto* view : views) {
+    for (const BoardView* view : views) {
       BoardPose pose = BoardPose::Zero();
       posed = posed && problem.StartPose(state.lens, *view, pose);
       state.poses.push_back(pose);
@@ -91,14 +88,14 @@ std::vector<std::string> NamesOf(LensModel model) {
 }
 
 /// Leaves out views that fit far worse than the others, together with their poses; false: none.
-bool RejectViews(const LensProblem& problem, const LensProblem::State& state, Corners& views,
+bool RejectViews(const LensProblem& problem, const LensProblem::State& state, Views& views,
                  std::vector<std::size_t>& indices, std::vector<BoardPose>& poses) {
   std::vector<double> rms;
   for (std::size_t v = 0; v < views.size(); ++v) {
     rms.push_back(Rms(problem.Residuals(state.lens, state.poses[v], *views[v], nullptr, nullptr)));
   }
   const double most = std::max(kLeastOutlier_px, kViewOutlier * Median(rms));
-  Corners kept;
+  Views kept;
   std::vector<std::size_t> kept_indices;
   poses.clear();
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -119,7 +116,7 @@ void Put(const BoardPose& pose, ViewFit& view) {
 }
 
 /// Huber's width for the residuals there are: three sigmas of their median.
-double HuberOf(const LensProblem& problem, const Corners& views, const LensProblem::State& state) {
+double HuberOf(const LensProblem& problem, const Views& views, const LensProblem::State& state) {
   std::vector<double> lengths;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const auto residuals =
@@ -134,20 +131,20 @@ double HuberOf(const LensProblem& problem, const Corners& views, const LensProbl
 /// The lens, and which views it was fitted to.
 struct Solution {
   LensProblem::State state;
-  Corners used;
+  Views used;
   std::vector<std::size_t> indices;  // of `used`, in all views
   double huber_px = kStartHuber_px;
 };
 
 /// Nothing if no beginning leads anywhere.
 std::optional<Solution> Solve(const LensProblem& problem, const std::vector<BoardView>& views,
-                              const BoardPattern& pattern, cv::Size picture) {
+                              cv::Size picture) {
   Solution solution;
   for (const BoardView& view : views) {
     solution.indices.push_back(solution.used.size());
-    solution.used.push_back(&view.corners);
+    solution.used.push_back(&view);
   }
-  solution.state = Begin(problem, solution.used, pattern, picture);
+  solution.state = Begin(problem, solution.used, picture);
   if (!(solution.state.cost < kNoCost)) return std::nullopt;
   const std::vector<bool> all(problem.parameters(), true);
   for (int round = 0; round < kRounds; ++round) {
@@ -164,9 +161,9 @@ std::optional<Solution> Solve(const LensProblem& problem, const std::vector<Boar
 
 /// One entry for each view: how it fits, or that it was left out, and how it would have.
 void DescribeViews(const LensProblem& problem, const Solution& solution,
-                   const std::vector<BoardView>& views, const BoardPattern& pattern, LensFit& fit) {
+                   const std::vector<BoardView>& views, LensFit& fit) {
   for (const BoardView& view : views) {
-    fit.views.push_back(FitView(view, pattern, fit));
+    fit.views.push_back(FitView(view, fit));
     fit.views.back().rejected = true;
   }
   double squares = 0;
@@ -190,21 +187,21 @@ Eigen::Vector3d ViewFit::normal() const {
   return z.z() < 0 ? Eigen::Vector3d(-z) : z;
 }
 
-absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, const BoardPattern& pattern,
-                                cv::Size picture, LensModel model) {
+absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, cv::Size picture,
+                                LensModel model) {
   if (views.size() < 3) {
     return absl::FailedPreconditionError(
         absl::StrCat("the board was seen whole in ", views.size(),
                      " views that differ; three are the least that a lens can be found from"));
   }
-  const LensProblem problem(model, pattern);
-  const std::optional<Solution> solution = Solve(problem, views, pattern, picture);
+  const LensProblem problem(model);
+  const std::optional<Solution> solution = Solve(problem, views, picture);
   LensFit fit;
   if (solution) {
     fit.lens = LensOf(solution->state.lens, model, picture);
     fit.names = NamesOf(model);
     fit.values = solution->state.lens;
-    DescribeViews(problem, *solution, views, pattern, fit);
+    DescribeViews(problem, *solution, views, fit);
   }
   if (!solution || !(fit.rms_px < kWorstRms_px)) {
     return absl::FailedPreconditionError(
@@ -218,18 +215,18 @@ absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, const Board
   return fit;
 }
 
-ViewFit FitView(const BoardView& view, const BoardPattern& pattern, const LensFit& fit) {
-  const LensProblem problem(fit.lens.model, pattern);
+ViewFit FitView(const BoardView& view, const LensFit& fit) {
+  const LensProblem problem(fit.lens.model);
   LensProblem::State state;
   state.lens = fit.values;
   ViewFit out{view.frame, {}, {}, 1e9, false};
   BoardPose pose;
-  if (!problem.StartPose(state.lens, view.corners, pose)) return out;
+  if (!problem.StartPose(state.lens, view, pose)) return out;
   state.poses = {pose};
   const std::vector<bool> none(problem.parameters(), false);
-  problem.Minimise({&view.corners}, none, kStartHuber_px, kIterations, state);
+  problem.Minimise({&view}, none, kStartHuber_px, kIterations, state);
   Put(state.poses[0], out);
-  out.rms_px = Rms(problem.Residuals(state.lens, state.poses[0], view.corners, nullptr, nullptr));
+  out.rms_px = Rms(problem.Residuals(state.lens, state.poses[0], view, nullptr, nullptr));
   return out;
 }
 

@@ -36,10 +36,10 @@ struct LensFit {
 /// Fits `model` (kBrownConrady or kKannalaBrandt) to views of the board: least squares with Huber's
 /// weights over the lens and a pose for each view; views that fit far worse than the others are
 /// left out. FailedPrecondition: no lens explains them; what to look at.
-absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, const BoardPattern& pattern,
-                                cv::Size picture, LensModel model);
+absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, cv::Size picture,
+                                LensModel model);
 
 /// The pose of the board in a view that had no part in the fit, with the lens held.
-ViewFit FitView(const BoardView& view, const BoardPattern& pattern, const LensFit& fit);
+ViewFit FitView(const BoardView& view, const LensFit& fit);
 
 }  // namespace saccade

@@ -44,23 +44,19 @@ struct LensProblem::Normal {
   double weighted_squares = 0;
 };
 
-LensProblem::LensProblem(LensModel model, const BoardPattern& pattern)
-    : fisheye_(model == LensModel::kKannalaBrandt), points_(pattern.Points()) {}
-
-bool LensProblem::StartPose(const VectorXd& lens, const std::vector<cv::Point2d>& corners,
-                            BoardPose& pose) const {
+bool LensProblem::StartPose(const VectorXd& lens, const BoardView& view, BoardPose& pose) const {
   std::vector<cv::Point2d> rays;
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> straight;
   if (fisheye_) {
-    cv::fisheye::undistortPoints(corners, straight, Matrix(lens), Coefficients(lens));
+    cv::fisheye::undistortPoints(view.corners, straight, Matrix(lens), Coefficients(lens));
   } else {
-    cv::undistortPoints(corners, straight, Matrix(lens), Coefficients(lens));
+    cv::undistortPoints(view.corners, straight, Matrix(lens), Coefficients(lens));
   }
   for (std::size_t k = 0; k < straight.size(); ++k) {
     if (!(cv::norm(straight[k]) < std::tan(kWidestRay_rad))) continue;
     rays.push_back(straight[k]);
-    points.push_back(points_[k]);
+    points.push_back(view.points[k]);
   }
   if (rays.size() < 6) return false;
   cv::Vec3d rotation, translation;
@@ -77,19 +73,19 @@ bool LensProblem::StartPose(const VectorXd& lens, const std::vector<cv::Point2d>
   return pose.allFinite() && pose[5] > 0;
 }
 
-VectorXd LensProblem::Residuals(const VectorXd& lens, const BoardPose& pose,
-                                const std::vector<cv::Point2d>& corners, MatrixXd* by_lens,
-                                MatrixXd* by_pose) const {
+VectorXd LensProblem::Residuals(const VectorXd& lens, const BoardPose& pose, const BoardView& view,
+                                MatrixXd* by_lens, MatrixXd* by_pose) const {
   std::vector<cv::Point2d> seen;
   cv::Mat jacobian;
   const cv::Vec3d rotation(pose[0], pose[1], pose[2]), translation(pose[3], pose[4], pose[5]);
   const bool wanted = by_lens != nullptr;
   const auto out = wanted ? cv::OutputArray(jacobian) : cv::noArray();
   if (fisheye_) {
-    cv::fisheye::projectPoints(points_, seen, rotation, translation, Matrix(lens),
+    cv::fisheye::projectPoints(view.points, seen, rotation, translation, Matrix(lens),
                                Coefficients(lens), 0, out);
   } else {
-    cv::projectPoints(points_, rotation, translation, Matrix(lens), Coefficients(lens), seen, out);
+    cv::projectPoints(view.points, rotation, translation, Matrix(lens), Coefficients(lens), seen,
+                      out);
   }
   if (wanted && fisheye_) {  // [f c k rotation translation skew]
     *by_lens = Columns(jacobian, 0, 8);
@@ -98,19 +94,19 @@ VectorXd LensProblem::Residuals(const VectorXd& lens, const BoardPose& pose,
     *by_lens = Columns(jacobian, 6, 9);
     *by_pose = Columns(jacobian, 0, 6);
   }
-  VectorXd residuals(2 * corners.size());
-  for (std::size_t k = 0; k < corners.size(); ++k) {
-    residuals[2 * k] = seen[k].x - corners[k].x;
-    residuals[2 * k + 1] = seen[k].y - corners[k].y;
+  VectorXd residuals(2 * view.corners.size());
+  for (std::size_t k = 0; k < view.corners.size(); ++k) {
+    residuals[2 * k] = seen[k].x - view.corners[k].x;
+    residuals[2 * k + 1] = seen[k].y - view.corners[k].y;
   }
   return residuals;
 }
 
 LensProblem::Normal LensProblem::Accumulate(const VectorXd& lens, const BoardPose& pose,
-                                            const std::vector<cv::Point2d>& corners,
-                                            const std::vector<bool>& free, double huber_px) const {
+                                            const BoardView& view, const std::vector<bool>& free,
+                                            double huber_px) const {
   MatrixXd by_lens, by_pose;
-  const VectorXd residuals = Residuals(lens, pose, corners, &by_lens, &by_pose);
+  const VectorXd residuals = Residuals(lens, pose, view, &by_lens, &by_pose);
   for (int k = 0; k < parameters(); ++k) {
     if (!free[k]) by_lens.col(k).setZero();
   }
@@ -126,7 +122,7 @@ LensProblem::Normal LensProblem::Accumulate(const VectorXd& lens, const BoardPos
           weighted_pose.transpose() * residuals, residuals.dot(weights.cwiseProduct(residuals))};
 }
 
-double LensProblem::Cost(const std::vector<const std::vector<cv::Point2d>*>& views, double huber_px,
+double LensProblem::Cost(const std::vector<const BoardView*>& views, double huber_px,
                          const State& state) const {
   double cost = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -165,7 +161,7 @@ LensProblem::State LensProblem::Stepped(const State& state, const std::vector<No
   return next;
 }
 
-void LensProblem::Minimise(const std::vector<const std::vector<cv::Point2d>*>& views,
+void LensProblem::Minimise(const std::vector<const BoardView*>& views,
                            const std::vector<bool>& free, double huber_px, int iterations,
                            State& state) const {
   double damping = 1e-3;
@@ -189,8 +185,8 @@ void LensProblem::Minimise(const std::vector<const std::vector<cv::Point2d>*>& v
   }
 }
 
-MatrixXd LensProblem::Covariance(const std::vector<const std::vector<cv::Point2d>*>& views,
-                                 double huber_px, const State& state) const {
+MatrixXd LensProblem::Covariance(const std::vector<const BoardView*>& views, double huber_px,
+                                 const State& state) const {
   const int n = parameters();
   const std::vector<bool> all(n, true);
   MatrixXd reduced = MatrixXd::Zero(n, n), spread = MatrixXd::Zero(n, n);
@@ -204,7 +200,7 @@ MatrixXd LensProblem::Covariance(const std::vector<const std::vector<cv::Point2d
         normal.lens_gradient - normal.lens_pose * pose.solve(normal.pose_gradient);
     spread += pull * pull.transpose();
     squares += normal.weighted_squares;
-    measured += 2 * static_cast<int>(views[v]->size()) - 6;
+    measured += 2 * static_cast<int>(views[v]->corners.size()) - 6;
   }
   const MatrixXd inverse = reduced.ldlt().solve(MatrixXd::Identity(n, n));
   MatrixXd corners = squares / std::max(1, measured - n) * inverse;

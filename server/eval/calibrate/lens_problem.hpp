@@ -16,15 +16,14 @@ using BoardPose = Eigen::Matrix<double, 6, 1>;
 /// cy coefficients], poses are eliminated view by view.
 class LensProblem {
  public:
-  LensProblem(LensModel model, const BoardPattern& pattern);
+  explicit LensProblem(LensModel model) : fisheye_(model == LensModel::kKannalaBrandt) {}
 
   int parameters() const { return fisheye_ ? 8 : 9; }
   /// Pose by perspective-n-point with this lens; false where that has no answer.
-  bool StartPose(const Eigen::VectorXd& lens, const std::vector<cv::Point2d>& corners,
-                 BoardPose& pose) const;
-  /// Corners predicted minus `corners`, interleaved x y; the Jacobians if asked for.
+  bool StartPose(const Eigen::VectorXd& lens, const BoardView& view, BoardPose& pose) const;
+  /// Corners predicted minus those seen, interleaved x y; the Jacobians if asked for.
   Eigen::VectorXd Residuals(const Eigen::VectorXd& lens, const BoardPose& pose,
-                            const std::vector<cv::Point2d>& corners, Eigen::MatrixXd* by_lens,
+                            const BoardView& view, Eigen::MatrixXd* by_lens,
                             Eigen::MatrixXd* by_pose) const;
 
   struct State {
@@ -34,26 +33,24 @@ class LensProblem {
   };
   /// Levenberg-Marquardt over the lens parameters that `free` names (by index; none: poses alone)
   /// and all poses.
-  void Minimise(const std::vector<const std::vector<cv::Point2d>*>& views,
-                const std::vector<bool>& free, double huber_px, int iterations, State& state) const;
+  void Minimise(const std::vector<const BoardView*>& views, const std::vector<bool>& free,
+                double huber_px, int iterations, State& state) const;
   /// Covariance of the lens at the minimum: per entry of the diagonal the larger of that of
   /// independent corners and that of independent views.
-  Eigen::MatrixXd Covariance(const std::vector<const std::vector<cv::Point2d>*>& views,
-                             double huber_px, const State& state) const;
+  Eigen::MatrixXd Covariance(const std::vector<const BoardView*>& views, double huber_px,
+                             const State& state) const;
 
  private:
   struct Normal;  // one view's share of the normal equations
-  Normal Accumulate(const Eigen::VectorXd& lens, const BoardPose& pose,
-                    const std::vector<cv::Point2d>& corners, const std::vector<bool>& free,
-                    double huber_px) const;
+  Normal Accumulate(const Eigen::VectorXd& lens, const BoardPose& pose, const BoardView& view,
+                    const std::vector<bool>& free, double huber_px) const;
   /// One damped step from `state`.
   State Stepped(const State& state, const std::vector<Normal>& normals,
                 const std::vector<bool>& free, double damping) const;
-  double Cost(const std::vector<const std::vector<cv::Point2d>*>& views, double huber_px,
+  double Cost(const std::vector<const BoardView*>& views, double huber_px,
               const State& state) const;
 
   bool fisheye_;
-  std::vector<cv::Point3d> points_;
 };
 
 }  // namespace saccade

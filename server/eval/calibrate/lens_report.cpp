@@ -56,22 +56,22 @@ absl::Status JudgeNumbers(const LensReport& report) {
 }  // namespace
 
 absl::StatusOr<LensReport> Calibrate(const std::string& source, const ViewPicker& picker,
-                                     const BoardPattern& pattern, cv::Size picture,
-                                     LensModel model) {
+                                     const std::string& board, cv::Size picture, LensModel model,
+                                     bool hold_out) {
   LensReport report;
   report.source = source;
-  report.pattern = pattern;
+  report.board = board;
   std::vector<BoardView> fitted, held_out;
   for (std::size_t k = 0; k < picker.views().size(); ++k) {
-    const bool hold = k % 5 == 4 && picker.views().size() >= 10;
+    const bool hold = hold_out && k % 5 == 4 && picker.views().size() >= 10;
     (hold ? held_out : fitted).push_back(picker.views()[k]);
   }
-  absl::StatusOr<LensFit> fit = FitLens(fitted, pattern, picture, model);
+  absl::StatusOr<LensFit> fit = FitLens(fitted, picture, model);
   if (!fit.ok()) return fit.status();
   report.fit = *std::move(fit);
   std::vector<double> squares;
   for (const BoardView& view : held_out) {
-    report.held_out.push_back(FitView(view, pattern, report.fit));
+    report.held_out.push_back(FitView(view, report.fit));
     squares.push_back(std::pow(report.held_out.back().rms_px, 2));
   }
   // The median: one held-out view may be what the fit would have rejected.
@@ -172,11 +172,10 @@ std::string CameraFileHeader(const LensReport& report) {
   }
   return absl::StrFormat(
       "Made by saccade calibrate-camera %s from %s\n"
-      "# board of %d x %d corners, %g m; %d views, rms %.3f px; %d held out, %.3f px\n"
+      "# %s; %d views, rms %.3f px; %d held out, %.3f px\n"
       "# one sigma: %s",
-      Version(), report.source, report.pattern.columns, report.pattern.rows,
-      report.pattern.square_m, Used(report), report.fit.rms_px, report.held_out.size(),
-      report.held_out_rms_px, sigmas);
+      Version(), report.source, report.board, Used(report), report.fit.rms_px,
+      report.held_out.size(), report.held_out_rms_px, sigmas);
 }
 
 }  // namespace saccade

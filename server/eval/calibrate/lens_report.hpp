@@ -13,7 +13,7 @@ namespace saccade {
 /// A calibration with what speaks for it.
 struct LensReport {
   std::string source;
-  BoardPattern pattern;
+  std::string board;  // in words, for the file
   LensFit fit;
   std::vector<ViewFit> held_out;  // views that had no part in the fit
   double held_out_rms_px = 0;
@@ -22,10 +22,10 @@ struct LensReport {
   int tilted_x = 0, tilted_y = 0;  // views whose normal leans so, by the lens found
 };
 
-/// Every fifth view is held out where there are ten; the others are fitted.
+/// The views are fitted; every fifth is held out where there are ten and `hold_out`.
 absl::StatusOr<LensReport> Calibrate(const std::string& source, const ViewPicker& picker,
-                                     const BoardPattern& pattern, cv::Size picture,
-                                     LensModel model);
+                                     const std::string& board, cv::Size picture, LensModel model,
+                                     bool hold_out = true);
 
 /// Whether that is enough to be believed. FailedPrecondition: too few views or tilts, a focal
 /// length or centre that the views do not determine, too little of the picture, other views that it

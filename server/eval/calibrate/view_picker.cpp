@@ -20,9 +20,6 @@ constexpr double kNear = 0.45;  // the board's diagonal against the picture's
 
 }  // namespace
 
-ViewPicker::ViewPicker(const BoardPattern& pattern, cv::Size picture)
-    : pattern_(pattern), picture_(picture) {}
-
 double ViewPicker::Place::Distance(const Place& other) const {
   const double apart = std::max(std::abs(x - other.x), std::abs(y - other.y));
   const double sizes = std::abs(size - other.size);
@@ -43,7 +40,7 @@ ViewPicker::Place ViewPicker::PlaceOf(const BoardView& view) const {
   const cv::Matx33d nominal(focal, 0, 0.5 * picture_.width, 0, focal, 0.5 * picture_.height, 0, 0,
                             1);
   cv::Vec3d rotation, translation;
-  if (cv::solvePnP(pattern_.Points(), view.corners, nominal, {}, rotation, translation, false,
+  if (cv::solvePnP(view.points, view.corners, nominal, {}, rotation, translation, false,
                    cv::SOLVEPNP_IPPE)) {
     cv::Matx33d turn;
     cv::Rodrigues(rotation, turn);
@@ -56,7 +53,7 @@ ViewPicker::Place ViewPicker::PlaceOf(const BoardView& view) const {
 
 ViewPicker::Verdict ViewPicker::Offer(const BoardView& view) {
   double moved = 0;
-  if (!last_.corners.empty() && view.time_ns - last_.time_ns < kSoonAfter_ns) {
+  if (last_.points == view.points && view.time_ns - last_.time_ns < kSoonAfter_ns) {
     for (std::size_t k = 0; k < view.corners.size(); ++k) {
       moved = std::max(moved, cv::norm(view.corners[k] - last_.corners[k]));
     }
@@ -68,14 +65,18 @@ ViewPicker::Verdict ViewPicker::Offer(const BoardView& view) {
   }
   if (moved > kHardlyMoved * picture_.width) return Verdict::kMoving;
   if (static_cast<int>(views_.size()) >= kMostViews) return Verdict::kAlike;
+  Take(view);
+  return Verdict::kTaken;
+}
+
+void ViewPicker::Take(const BoardView& view) {
   views_.push_back(view);
-  places_.push_back(place);
+  places_.push_back(PlaceOf(view));
   for (const cv::Point2d& corner : view.corners) {
     const int column = static_cast<int>(corner.x * kColumns / picture_.width);
     const int row = static_cast<int>(corner.y * kRows / picture_.height);
     ++counts_[std::clamp(row, 0, kRows - 1) * kColumns + std::clamp(column, 0, kColumns - 1)];
   }
-  return Verdict::kTaken;
 }
 
 double ViewPicker::Covered() const {

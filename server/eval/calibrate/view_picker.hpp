@@ -17,8 +17,10 @@ class ViewPicker {
   static constexpr int kColumns = 6, kRows = 4;
   static constexpr int kMostViews = 60, kEnoughViews = 24;
 
-  ViewPicker(const BoardPattern& pattern, cv::Size picture);
+  explicit ViewPicker(cv::Size picture) : picture_(picture) {}
 
+  /// Takes `view` whatever it adds.
+  void Take(const BoardView& view);
   enum class Verdict { kTaken, kAlike, kMoving };
   /// Takes `view`, if it differs from all those taken. One that follows another within a fifth of a
   /// second is taken only if the board hardly moved: else it is blurred, or torn.
@@ -43,7 +45,6 @@ class ViewPicker {
   std::string TiltAdvice() const;
   std::string PlaceAdvice() const;
 
-  BoardPattern pattern_;
   cv::Size picture_;
   std::vector<BoardView> views_;
   std::vector<Place> places_;

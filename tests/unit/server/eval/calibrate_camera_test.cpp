@@ -36,10 +36,10 @@ CameraIntrinsics Fisheye() {
 }
 
 ViewPicker Picked(const std::vector<cv::Mat>& pictures, cv::Size size) {
-  ViewPicker picker(kBoard, size);
+  ViewPicker picker(size);
   for (std::size_t k = 0; k < pictures.size(); ++k) {
     const auto corners = FindBoard(pictures[k], kBoard);
-    if (!corners.empty()) picker.Offer({k, static_cast<Timestamp>(k) * 1'000'000'000, corners});
+    if (!corners.empty()) picker.Offer({k, static_cast<Timestamp>(k) * 1'000'000'000, corners, kBoard.Points()});
   }
   return picker;
 }
@@ -56,7 +56,7 @@ class LensFromBoards : public ::testing::TestWithParam<unsigned> {
     const BoardCamera camera(lens, kBoard);
     const cv::Size size(lens.width, lens.height);
     const ViewPicker picker = Picked(ShownBoard(camera, kBoard, 40, 38, 2.0, GetParam()), size);
-    const auto report = Calibrate("test", picker, kBoard, size, lens.model);
+    const auto report = Calibrate("test", picker, kBoard.Words(), size, lens.model);
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_TRUE(Judge(*report).ok()) << Judge(*report);
     const std::vector<double> truth = TruthOf(lens);
@@ -78,7 +78,7 @@ TEST_P(LensFromBoards, KannalaBrandtIsFoundWithinThreeOfItsSigmas) { ExpectTruth
 INSTANTIATE_TEST_SUITE_P(Seeds, LensFromBoards, ::testing::Values(1U, 2U, 3U, 4U));
 
 absl::Status Verdict(const ViewPicker& picker) {
-  const auto report = Calibrate("test", picker, kBoard, {640, 480}, LensModel::kBrownConrady);
+  const auto report = Calibrate("test", picker, kBoard.Words(), {640, 480}, LensModel::kBrownConrady);
   return report.ok() ? Judge(*report) : report.status();
 }
 
@@ -104,7 +104,7 @@ TEST(CalibrateCamera, ABadViewIsLeftOutAndNamed) {
   for (std::size_t k = 0; k < views[3].corners.size(); ++k) {
     views[3].corners[k].x += k % 2 == 0 ? 3 : -3;  // torn: two pictures in one
   }
-  const auto fit = FitLens(views, kBoard, {640, 480}, LensModel::kBrownConrady);
+  const auto fit = FitLens(views, {640, 480}, LensModel::kBrownConrady);
   ASSERT_TRUE(fit.ok()) << fit.status();
   EXPECT_TRUE(fit->views[3].rejected);
   EXPECT_GT(fit->views[3].rms_px, 1.0);
@@ -112,7 +112,7 @@ TEST(CalibrateCamera, ABadViewIsLeftOutAndNamed) {
 }
 
 TEST(ViewPicker, TakesWhatDiffersAndSaysWhatIsMissing) {
-  ViewPicker picker(kBoard, {640, 480});
+  ViewPicker picker({640, 480});
   EXPECT_THAT(picker.Advice(), HasSubstr("whole board"));
   const auto straight = [](double x, double y, double step) {
     std::vector<cv::Point2d> corners;
@@ -121,12 +121,12 @@ TEST(ViewPicker, TakesWhatDiffersAndSaysWhatIsMissing) {
     }
     return corners;
   };
-  EXPECT_EQ(picker.Offer({0, 0, straight(200, 150, 25)}), ViewPicker::Verdict::kTaken);
-  EXPECT_EQ(picker.Offer({1, 1'000'000'000, straight(204, 150, 25)}), ViewPicker::Verdict::kAlike);
+  EXPECT_EQ(picker.Offer({0, 0, straight(200, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kTaken);
+  EXPECT_EQ(picker.Offer({1, 1'000'000'000, straight(204, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kAlike);
   EXPECT_THAT(picker.Advice(), HasSubstr("left edge"));
   // A thirtieth of a second later it is far away: it moves.
-  EXPECT_EQ(picker.Offer({2, 1'033'000'000, straight(20, 150, 25)}), ViewPicker::Verdict::kMoving);
-  EXPECT_EQ(picker.Offer({3, 1'066'000'000, straight(20, 150, 25)}), ViewPicker::Verdict::kTaken);
+  EXPECT_EQ(picker.Offer({2, 1'033'000'000, straight(20, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kMoving);
+  EXPECT_EQ(picker.Offer({3, 1'066'000'000, straight(20, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kTaken);
   EXPECT_THAT(picker.Advice(), HasSubstr("right edge"));
   EXPECT_FALSE(picker.Complete());
 }
