@@ -12,7 +12,7 @@ namespace {
 constexpr int kIterations = 40;
 constexpr double kConverged_px = 0.003;
 // What a lens file, a printer and a pixel's own shape leave of the best corner [px^2].
-constexpr double kLeastVariance_px2 = 0.01 * 0.01;
+constexpr double kLeastVariance_px2 = 0.04 * 0.04;
 // Of a pixel's grey value, with what sampling between pixels adds.
 constexpr double kNoise = 4.0;
 // A corner of line fits that could not be looked at more closely.
