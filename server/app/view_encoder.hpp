@@ -58,7 +58,8 @@ class ViewEncoder {
   /// The next picture becomes a key frame, at most four times a second; if no frame comes, because
   /// the source ended or stands still, the last one is coded again.
   void RequestKeyFrame();
-  /// Pictures may be shown again: the next frame has time to come before the last one is coded anew.
+  /// Pictures may be shown again: the next frame has time to come before the last one is coded
+  /// anew.
   void AwaitFrame();
 
   RollingStatistics::Summary milliseconds() const { return milliseconds_.At(MonotonicNow()); }

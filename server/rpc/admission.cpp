@@ -9,9 +9,18 @@
 namespace saccade {
 namespace {
 
-constexpr const char* kWhat[kTolls] = {
-    "joins", "streams opened", "edits", "resets of the map", "stills", "gaze commands", "questions",
-    "invites redeemed", "words of pointers", "pictures", "messages", "packets of voice"};
+constexpr const char* kWhat[kTolls] = {"joins",
+                                       "streams opened",
+                                       "edits",
+                                       "resets of the map",
+                                       "stills",
+                                       "gaze commands",
+                                       "questions",
+                                       "invites redeemed",
+                                       "words of pointers",
+                                       "pictures",
+                                       "messages",
+                                       "packets of voice"};
 
 absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const char* whose) {
   if (!wait_ns) return absl::OkStatus();
@@ -21,16 +30,16 @@ absl::Status Judge(const std::optional<Timestamp>& wait_ns, Toll toll, const cha
 }  // namespace
 
 const RpcLimits::Kind& RpcLimits::of(Toll toll) const {
-  const Kind* const kinds[kTolls] = {&join, &subscribe, &edit,   &reset, &still,
-                                     &gaze, &read,      &redeem, &point, &picture, &say,   &speak};
+  const Kind* const kinds[kTolls] = {&join, &subscribe, &edit,  &reset,   &still, &gaze,
+                                     &read, &redeem,    &point, &picture, &say,   &speak};
   return *kinds[static_cast<int>(toll)];
 }
 
 RpcLimits RpcLimits::Scaled(double factor) const {
   RpcLimits scaled = *this;
-  for (Kind* kind : {&scaled.join, &scaled.subscribe, &scaled.edit, &scaled.reset, &scaled.still,
-                     &scaled.gaze, &scaled.read, &scaled.redeem, &scaled.point, &scaled.picture,
-                     &scaled.say, &scaled.speak}) {
+  for (Kind* kind :
+       {&scaled.join, &scaled.subscribe, &scaled.edit, &scaled.reset, &scaled.still, &scaled.gaze,
+        &scaled.read, &scaled.redeem, &scaled.point, &scaled.picture, &scaled.say, &scaled.speak}) {
     for (RateLimit* limit : {&kind->courtesy, &kind->session, &kind->peer, &kind->server}) {
       limit->per_s *= factor;
       limit->burst = std::max(1.0, limit->burst * factor);

@@ -16,7 +16,7 @@ constexpr std::size_t kIdBytes = 40;
 constexpr std::size_t kAnchorBytes = 160;
 constexpr std::size_t kAnnotationBytes = 127;
 constexpr std::size_t kTurnBytes = 41, kExtentBytes = 31, kNumberBytes = 7, kLengthsBytes = 20;
-constexpr std::size_t kPictureBytes = 30;                          // but for its texts
+constexpr std::size_t kPictureBytes = 30;  // but for its texts
 constexpr std::size_t kItemBytes = 26;
 constexpr std::size_t kInkPointBytes = 29;
 constexpr std::size_t kLengthBytes = 6;

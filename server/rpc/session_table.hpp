@@ -27,7 +27,7 @@ struct Session {
   std::string person_id;  // UUID; public: who stands behind it, in this session and others
   bool has_key = false;   // the person can come back in another session
   std::uint32_t color_rgba = 0;  // the person's
-  std::string invite_id;  // of whom that token came (Access::invite_id)
+  std::string invite_id;         // of whom that token came (Access::invite_id)
 };
 
 /// One line that goes into others' lists and into the log. InvalidArgument: too long, or it holds a

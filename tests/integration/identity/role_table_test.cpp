@@ -85,11 +85,10 @@ const std::map<std::string, Least>& Promised() {
 std::vector<const MethodDescriptor*> EveryMethod() {
   std::vector<const MethodDescriptor*> all;
   // Referred to, so that the linker keeps what stands in their files.
-  for (const auto* linked :
-       {v1::GetAccessRequest::descriptor(), v1::JoinRequest::descriptor(),
-        v1::ListAnnotationsRequest::descriptor(), v1::GetMapRequest::descriptor(),
-        v1::GetGazeStateRequest::descriptor(), v1::PointRequest::descriptor(),
-        v1::WearerHello::descriptor()}) {
+  for (const auto* linked : {v1::GetAccessRequest::descriptor(), v1::JoinRequest::descriptor(),
+                             v1::ListAnnotationsRequest::descriptor(),
+                             v1::GetMapRequest::descriptor(), v1::GetGazeStateRequest::descriptor(),
+                             v1::PointRequest::descriptor(), v1::WearerHello::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

@@ -39,7 +39,8 @@ ViewPicker Picked(const std::vector<cv::Mat>& pictures, cv::Size size) {
   ViewPicker picker(size);
   for (std::size_t k = 0; k < pictures.size(); ++k) {
     const auto corners = FindBoard(pictures[k], kBoard);
-    if (!corners.empty()) picker.Offer({k, static_cast<Timestamp>(k) * 1'000'000'000, corners, kBoard.Points()});
+    if (!corners.empty())
+      picker.Offer({k, static_cast<Timestamp>(k) * 1'000'000'000, corners, kBoard.Points()});
   }
   return picker;
 }
@@ -78,7 +79,8 @@ TEST_P(LensFromBoards, KannalaBrandtIsFoundWithinThreeOfItsSigmas) { ExpectTruth
 INSTANTIATE_TEST_SUITE_P(Seeds, LensFromBoards, ::testing::Values(1U, 2U, 3U, 4U));
 
 absl::Status Verdict(const ViewPicker& picker) {
-  const auto report = Calibrate("test", picker, kBoard.Words(), {640, 480}, LensModel::kBrownConrady);
+  const auto report =
+      Calibrate("test", picker, kBoard.Words(), {640, 480}, LensModel::kBrownConrady);
   return report.ok() ? Judge(*report) : report.status();
 }
 
@@ -121,12 +123,16 @@ TEST(ViewPicker, TakesWhatDiffersAndSaysWhatIsMissing) {
     }
     return corners;
   };
-  EXPECT_EQ(picker.Offer({0, 0, straight(200, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kTaken);
-  EXPECT_EQ(picker.Offer({1, 1'000'000'000, straight(204, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kAlike);
+  EXPECT_EQ(picker.Offer({0, 0, straight(200, 150, 25), kBoard.Points()}),
+            ViewPicker::Verdict::kTaken);
+  EXPECT_EQ(picker.Offer({1, 1'000'000'000, straight(204, 150, 25), kBoard.Points()}),
+            ViewPicker::Verdict::kAlike);
   EXPECT_THAT(picker.Advice(), HasSubstr("left edge"));
   // A thirtieth of a second later it is far away: it moves.
-  EXPECT_EQ(picker.Offer({2, 1'033'000'000, straight(20, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kMoving);
-  EXPECT_EQ(picker.Offer({3, 1'066'000'000, straight(20, 150, 25), kBoard.Points()}), ViewPicker::Verdict::kTaken);
+  EXPECT_EQ(picker.Offer({2, 1'033'000'000, straight(20, 150, 25), kBoard.Points()}),
+            ViewPicker::Verdict::kMoving);
+  EXPECT_EQ(picker.Offer({3, 1'066'000'000, straight(20, 150, 25), kBoard.Points()}),
+            ViewPicker::Verdict::kTaken);
   EXPECT_THAT(picker.Advice(), HasSubstr("right edge"));
   EXPECT_FALSE(picker.Complete());
 }
