@@ -288,9 +288,8 @@ export class Session {
 
   private receivePicture(unit: AccessUnit): void {
     const facts = this.reader.read(unit, this.joined?.intrinsics, this.lastEventMs);
-    if (!facts) return;
-    this.frames.set(facts.frameId, facts);
-    this.pictures.decode(facts, unit);
+    if (facts) this.frames.set(facts.frameId, facts);
+    if (facts) this.pictures.decode(facts, unit);
   }
 
   private receivePose(pose: Pose): void {

@@ -1,4 +1,4 @@
-import { newUuid } from '../session/edits';
+import { newUuid } from '../session/uuid';
 import type { Session } from '../session/session';
 import type { ChatMessage } from '../session/talk_state';
 import { VoiceRoom } from '../talk/voice_room';

@@ -1,4 +1,5 @@
 // A real OpenID Connect provider (npm oidc-provider) on loopback: a firm with two people and a machine.
+import { webcrypto as crypto } from 'node:crypto';
 import { createServer } from 'node:http';
 import Provider from 'oidc-provider';
 
