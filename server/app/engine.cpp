@@ -24,14 +24,21 @@ std::string NameOf(const SourceInfo& info) {
   return info.remark.empty() ? info.uri : absl::StrCat(info.uri, " (", info.remark, ")");
 }
 
-// Of the click that it is about, if it is about one.
-const PixelTarget* ClickOf(const Command& command) {
+// Of the pixels that it is about.
+std::vector<const PixelTarget*> ClicksOf(const Command& command) {
+  std::vector<const PixelTarget*> clicks;
+  const auto add = [&](const AnnotationTarget& target) {
+    if (const auto* click = std::get_if<PixelTarget>(&target)) clicks.push_back(click);
+  };
   if (const auto* create = std::get_if<CreateAnnotation>(&command)) {
-    return std::get_if<PixelTarget>(&create->draft.target);
+    add(create->draft.target);
+    if (create->draft.end_target) add(*create->draft.end_target);
   }
-  const auto* update = std::get_if<UpdateAnnotation>(&command);
-  if (update == nullptr || !update->patch.target) return nullptr;
-  return std::get_if<PixelTarget>(&*update->patch.target);
+  if (const auto* update = std::get_if<UpdateAnnotation>(&command)) {
+    if (update->patch.target) add(*update->patch.target);
+    if (update->patch.end_target) add(*update->patch.end_target);
+  }
+  return clicks;
 }
 
 constexpr int kTrimEveryS = 2;
@@ -240,7 +247,7 @@ void Engine::RunClock(std::stop_token stop) {
 }
 
 absl::Status Engine::Submit(Command command) {
-  if (const PixelTarget* click = ClickOf(command)) {
+  for (const PixelTarget* click : ClicksOf(command)) {
     if (absl::Status may = pictures_->MayClick(click->frame_id); !may.ok()) return may;
   }
   return inbox_.Submit(std::move(command));

@@ -25,7 +25,7 @@ enum class Toll {
   kSay,
   kSpeak
 };
-inline constexpr int kTolls = 10;
+inline constexpr int kTolls = 12;
 
 /// How often each kind may be called by one session, by one address, and by all together.
 ///

@@ -75,6 +75,7 @@ grpc::ServerUnaryReactor* TalkService::Say(Context* context, const v1::SayReques
   if (absl::Status valid = CheckMessage(*request); !valid.ok()) return call.Finish(valid);
   v1::ChatMessage message;
   message.set_participant_id(session->participant_id);
+  message.set_person_id(session->person_id);
   message.set_display_name(session->display_name);
   message.set_text(request->text());
   message.set_annotation_id(request->annotation_id());
