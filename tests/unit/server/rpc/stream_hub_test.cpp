@@ -61,7 +61,9 @@ class Client : public Subscriber {
                     .participant_id = id,
                     .display_name = id,
                     .role = v1::ROLE_VIEWER,
-                    .access_id = "token of " + id},
+                    .access_id = "token of " + id,
+                    .person_id = id,
+                    .invite_id = {}},
                    options, hub.bytes()),
         hub_(hub),
         cost_(cost) {}
