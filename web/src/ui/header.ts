@@ -54,7 +54,8 @@ export class Header {
   update(session: Session, player: Player, meter: LatencyMeter): void {
     const nowMs = pageNowMs();
     const { link, pose, poseMs, sourceEnded, participants, joined } = session;
-    const words = statusWords({ link, pose, sourceEnded, nowMs, poseMs });
+    const paused = session.talk.pause !== undefined;
+    const words = statusWords({ link, pose, sourceEnded, nowMs, poseMs, paused });
     setText(this.source, joined?.source ?? '');
     this.source.title = joined?.source ?? '';
     setText(this.mark, words.mark);

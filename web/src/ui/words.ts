@@ -25,6 +25,7 @@ export interface StatusInput {
   readonly sourceEnded: boolean;
   readonly nowMs: number;
   readonly poseMs?: number; // when the pose came; absent: just now
+  readonly paused?: boolean; // by the wearer: the picture is not missed
 }
 
 const NO_PICTURE_MS = 2000;
@@ -55,6 +56,9 @@ export function statusWords(input: StatusInput): StatusWords {
       advice: 'the last picture and map stay',
       warn: false,
     };
+  }
+  if (input.paused) {
+    return { mark: '■', text: 'picture paused', advice: 'the map stays live', warn: false };
   }
   if (pose && nowMs - poseMs > NO_PICTURE_MS) {
     return {

@@ -271,6 +271,7 @@ describe('statusWords', () => {
     const away = statusWords({ ...input, poseMs: 6000 });
     expect(away).toMatchObject({ text: 'no picture for 4 s', warn: true });
     expect(away.advice).toMatch(/phone may be away/);
+    expect(statusWords({ ...input, poseMs: 6000, paused: true }).text).toBe('picture paused');
     expect(statusWords({ ...input, poseMs: 6000, sourceEnded: true }).text).toBe('recording ended');
   });
 });
