@@ -247,6 +247,9 @@ export async function byMouse(context) {
   const arrow = await made(context, AnnotationShape.ARROW, () => click('a', 0.55, 0.6));
   await ann.press('v');
   await sleep(800);
+  await ann.press('p'); // a page that draws three times a second shows the handle where it was
+  await page.locator('.video.frozen').waitFor();
+  await sleep(500);
   const handle = await handleAt(context, arrow);
   const to = [handle[0] + 60, handle[1] + 40];
   await page.mouse.move(...handle);
@@ -263,6 +266,7 @@ export async function byMouse(context) {
     turned !== undefined,
     turned ? `w ${turned.worldFromMark.w.toFixed(3)}` : await noteOf(ann),
   );
+  await ann.press('p');
   await moved(context, turned ?? arrow);
 }
 

@@ -70,6 +70,9 @@ export async function byKeyboard(context) {
       await ann.press('Control+Enter');
     }),
   );
+  // The mark is there before its dialog has heard of it.
+  const free = () => page.waitForFunction(() => !document.querySelector('dialog[open]'));
+  await free();
   await page.locator('.video').focus();
   await ann.press('u');
   note(
@@ -90,6 +93,7 @@ export async function byKeyboard(context) {
     `${done.join(', ')}${missed.length > 0 ? `; not ${missed.join(', ')}: ${await noteOf(ann)}` : ''}`,
   );
 
+  await free();
   await laserByKeys(context);
   await turnByKeys(context);
   await areaByKeys(context);
