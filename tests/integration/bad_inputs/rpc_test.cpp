@@ -166,8 +166,8 @@ TEST_F(BadRpc, DraftsOutOfBoundsAreRefusedByField) {
     for (int i = 0; i < points; ++i) r.mutable_draft()->add_ink_px()->set_u(1);
   };
   Refuse("ink of 2001 points", kInvalid, "ink_px", [&](auto& r) { stroke(r, 2001); });
-  Refuse("ink of 100000 points", StatusCode::RESOURCE_EXHAUSTED, "larger than max",
-         [&](auto& r) { stroke(r, 100'000); });
+  Refuse("ink of 200000 points", StatusCode::RESOURCE_EXHAUSTED, "larger than max",
+         [&](auto& r) { stroke(r, 200'000); });
 }
 
 TEST_F(BadRpc, WhoIsNotKnownOrNotAllowedIsRefused) {
