@@ -29,7 +29,10 @@ async function fill(context, count) {
       text: i % 3 === 0 ? `mark ${i}` : '',
       sizeM: 0.04,
       colorRgba: [0xffffffff, 0xff9a3dff, 0xff8ad8ff][i % 3],
-      extentM: { x: 0.05, y: 0.04, z: 0.03 },
+      extentM:
+        SHAPES[i % SHAPES.length] === AnnotationShape.BOX
+          ? { x: 0.05, y: 0.04, z: 0.03 }
+          : undefined,
       target: {
         target: {
           case: 'pointInWorldM',

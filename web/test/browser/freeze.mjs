@@ -4,7 +4,7 @@ import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { inCamera, length, minus } from './optics.mjs';
 import { decodePng, greyOf, median, psnr } from './pictures.mjs';
 
-const OBJECTS = 3; // clicked at once, and again when the frame is gone
+const OBJECTS = 5; // clicked at once, and again when the frame is gone; of three, two may lie on outlines
 const RING_S = 10; // how long the server keeps a frame
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
