@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "shared/wire/annotation_shape.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade::wire {
@@ -14,30 +15,10 @@ absl::Status Bad(absl::string_view field, absl::string_view problem) {
 }
 
 absl::StatusOr<AnnotationShape> ShapeFromProto(v1::AnnotationShape shape, absl::string_view field) {
-  switch (shape) {
-    case v1::ANNOTATION_SHAPE_CUBE:
-      return AnnotationShape::kCube;
-    case v1::ANNOTATION_SHAPE_NOTE:
-      return AnnotationShape::kNote;
-    case v1::ANNOTATION_SHAPE_ARROW:
-      return AnnotationShape::kArrow;
-    case v1::ANNOTATION_SHAPE_INK:
-      return AnnotationShape::kInk;
-    case v1::ANNOTATION_SHAPE_BOX:
-      return AnnotationShape::kBox;
-    case v1::ANNOTATION_SHAPE_MEASURE:
-      return AnnotationShape::kMeasure;
-    case v1::ANNOTATION_SHAPE_PIN:
-      return AnnotationShape::kPin;
-    case v1::ANNOTATION_SHAPE_PICTURE:
-      return AnnotationShape::kPicture;
-    case v1::ANNOTATION_SHAPE_CHECK_LIST:
-      return AnnotationShape::kCheckList;
-    default:
-      return Bad(field, absl::StrCat("unknown shape ", static_cast<int>(shape),
-                                     ": use CUBE, NOTE, ARROW, INK, BOX, MEASURE, PIN, PICTURE or "
-                                     "CHECK_LIST"));
-  }
+  if (const std::optional<AnnotationShape> known = KnownShape(shape)) return *known;
+  return Bad(field, absl::StrCat("unknown shape ", static_cast<int>(shape),
+                                 ": use CUBE, NOTE, ARROW, INK, BOX, MEASURE, PIN, PICTURE or "
+                                 "CHECK_LIST"));
 }
 
 /// What a shape does not have must not be given: it would be lost without a word.

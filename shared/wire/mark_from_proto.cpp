@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "shared/wire/annotation_shape.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade::wire {
@@ -14,30 +15,6 @@ namespace {
 
 absl::Status Bad(absl::string_view field, absl::string_view problem) {
   return absl::InvalidArgumentError(absl::StrCat(field, ": ", problem));
-}
-
-/// A shape of a newer server is still shown.
-AnnotationShape KnownShape(v1::AnnotationShape shape) {
-  switch (shape) {
-    case v1::ANNOTATION_SHAPE_NOTE:
-      return AnnotationShape::kNote;
-    case v1::ANNOTATION_SHAPE_ARROW:
-      return AnnotationShape::kArrow;
-    case v1::ANNOTATION_SHAPE_INK:
-      return AnnotationShape::kInk;
-    case v1::ANNOTATION_SHAPE_BOX:
-      return AnnotationShape::kBox;
-    case v1::ANNOTATION_SHAPE_MEASURE:
-      return AnnotationShape::kMeasure;
-    case v1::ANNOTATION_SHAPE_PIN:
-      return AnnotationShape::kPin;
-    case v1::ANNOTATION_SHAPE_PICTURE:
-      return AnnotationShape::kPicture;
-    case v1::ANNOTATION_SHAPE_CHECK_LIST:
-      return AnnotationShape::kCheckList;
-    default:
-      return AnnotationShape::kCube;
-  }
 }
 
 /// What only some shapes have.
@@ -85,7 +62,8 @@ absl::Status ReadMark(const v1::Annotation& message, absl::string_view field, An
 absl::StatusOr<Annotation> FromProto(const v1::Annotation& message, absl::string_view field) {
   Annotation out;
   out.id = message.id();
-  out.shape = KnownShape(message.shape());
+  // A shape of a newer server is still shown.
+  out.shape = KnownShape(message.shape()).value_or(AnnotationShape::kCube);
   out.text = message.text();
   out.author = message.author();
   out.author_person_id = message.author_person_id();
