@@ -110,6 +110,7 @@ export class WearApp {
       phoneId: phoneId(),
       cameraLabel: () => this.camera.label,
       nowMs: pageNowMs,
+      answers: (signal) => fetch(location.pathname, { method: 'HEAD', cache: 'no-store', signal }),
       events: {
         welcome: ({ width, height, fpsHz, intrinsics }) => {
           this.intrinsics = intrinsics;

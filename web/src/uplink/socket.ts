@@ -32,6 +32,8 @@ export interface UplinkOptions {
   readonly events: UplinkEvents;
   readonly nowMs: () => number; // performance.timeOrigin + now()
   readonly makeSocket?: (url: string) => WebSocket;
+  /** Settles when the server answers anything at all; absent: only the WebSocket is tried. */
+  readonly answers?: (signal: AbortSignal) => Promise<unknown>;
   readonly random?: () => number;
 }
 
@@ -39,6 +41,8 @@ const CONNECT_MS = 3000; // a dead network says nothing
 const MOST_PAUSE_MS = 1000; // the camera is what everybody waits for
 const PING_MS = 1000;
 const SILENCE_MS = 4000;
+// Browsers make WebSockets wait up to 5 s once some have failed: with no network, none are spent.
+const FAILURES_BEFORE_ASKING = 2;
 
 const ns = (ms: number): bigint => BigInt(Math.round(ms * 1e3)) * 1000n;
 
@@ -57,6 +61,8 @@ export class Uplink {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private readonly ticking: ReturnType<typeof setInterval>;
   private stopped = false;
+  private failures = 0; // since the last welcome
+  private asking: AbortController | undefined;
 
   constructor(private readonly options: UplinkOptions) {
     this.backoff = new Backoff(options.random, MOST_PAUSE_MS);
@@ -109,7 +115,7 @@ export class Uplink {
 
   /** The network or the page is back: no use in waiting longer. */
   hurry(): void {
-    if (this.timer === undefined || this.stopped) return;
+    if ((this.timer === undefined && !this.asking) || this.stopped) return;
     clearTimeout(this.timer);
     this.connect();
   }
@@ -118,6 +124,7 @@ export class Uplink {
     this.stopped = true;
     clearInterval(this.ticking);
     clearTimeout(this.timer);
+    this.asking?.abort();
     const { socket } = this;
     this.socket = undefined;
     socket?.close();
@@ -131,6 +138,29 @@ export class Uplink {
 
   private connect(): void {
     this.timer = undefined;
+    this.asking?.abort();
+    this.asking = undefined;
+    const { answers } = this.options;
+    if (answers && this.failures >= FAILURES_BEFORE_ASKING) void this.ask(answers);
+    else this.open();
+  }
+
+  private async ask(answers: (signal: AbortSignal) => Promise<unknown>): Promise<void> {
+    const asking = new AbortController();
+    this.asking = asking;
+    const timer = setTimeout(() => asking.abort(), CONNECT_MS);
+    const answered = await answers(asking.signal).then(
+      () => true,
+      () => false,
+    );
+    clearTimeout(timer);
+    if (this.asking !== asking || this.stopped) return;
+    this.asking = undefined;
+    if (answered) this.open();
+    else this.lost('no answer from the server');
+  }
+
+  private open(): void {
     const { makeSocket, url } = this.options;
     const socket = makeSocket ? makeSocket(url) : new WebSocket(url);
     socket.binaryType = 'arraybuffer';
@@ -166,6 +196,7 @@ export class Uplink {
       case 'welcome':
         this.state = { kind: 'live' };
         this.problem = '';
+        this.failures = 0;
         this.backoff.reset();
         this.echo = { serverNs: 0n, arrivedMs: 0 };
         this.options.events.welcome(message.value);
@@ -220,6 +251,7 @@ export class Uplink {
     const { socket, state } = this;
     this.socket = undefined; // of a dead network, its close takes minutes: nobody waits for it
     socket?.close();
+    ++this.failures;
     const sinceMs = state.kind === 'reconnecting' ? state.sinceMs : this.options.nowMs();
     this.state = { kind: 'reconnecting', reason, sinceMs };
     this.timer = setTimeout(() => this.connect(), this.backoff.nextMs());

@@ -244,7 +244,7 @@ async function mappedOf({ map }, objects) {
 }
 
 /** As a person would: turn the wheel over the object until it is near, then click it. */
-async function aimInMap(context, used) {
+export async function aimInMap(context, used) {
   const { expert, truth } = context;
   const { id } = await expert.look();
   const frame = truth.frame(id);

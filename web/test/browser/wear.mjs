@@ -1,24 +1,19 @@
 // A phone as the wearable: Chromium with a fake camera that plays pictures of the simulator, whose truth is
 // known, opens an invite link over https and becomes the camera; an expert in another Chromium sees it and
 // places marks. Where this may make network namespaces, each has a network of its own, and the phone's is cut
-// (SACCADE_CUT_S, 4 s by default).
+// (SACCADE_CUT_S, 4 s by default). SACCADE_MARKS things are clicked (3 by default), a third of them in the map.
 import { execFileSync, spawnSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { Expert } from './expert.mjs';
 import { trust } from './invite.mjs';
-import { inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
-import { median } from './pictures.mjs';
 import { startServer, Truth } from './server.mjs';
+import { BITS, BLOCK, marks, MARKS } from './wear_marks.mjs';
 
 const FRAMES = 300; // played to and fro: 20 s without a jump
-const BITS = 9;
-const BLOCK = { width: 16, height: 8 }; // of a bit, in the uppermost rows: no feature is looked for there
 const PHONE = { width: 390, height: 844 };
-const AIM_PX = 15; // a click farther than this from its object missed it: taken back, tried again
 const OUT_MS = 1000;
 const CUT_S = Number(process.env['SACCADE_CUT_S'] ?? 4);
-const MARKS = Number(process.env['SACCADE_MARKS'] ?? 3);
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const ip = (...words) => spawnSync('ip', words).status === 0;
@@ -108,29 +103,6 @@ async function truthOf(binary, folder, source) {
   return truth;
 }
 
-/** The number that the shown picture carries, and what the page says belongs to it, read in one go. */
-const shownBy = (page) =>
-  page.evaluate(
-    ({ bits, width, height }) => {
-      const picture = document.querySelector('canvas.picture');
-      const { data } = picture.getContext('2d').getImageData(0, 0, bits * width, height);
-      let number = 0;
-      for (let i = 0; i < bits; ++i) {
-        let sum = 0;
-        for (let v = 2; v < height - 2; ++v) {
-          for (let u = 4; u < width - 4; ++u) sum += data[4 * (v * bits * width + i * width + u)];
-        }
-        if (sum / ((height - 4) * (width - 8)) > 128) number |= 1 << i;
-      }
-      const marks = document.querySelector('canvas.marks');
-      const said = (marks?.dataset.marks ?? '')
-        .split(',')
-        .map((words) => words.split(' ').map(Number));
-      return { number, frameId: Number(picture.dataset.frameId), marks: said };
-    },
-    { bits: BITS, ...BLOCK },
-  );
-
 export async function runWear({ server: binary, chromium, seed, shots, folder }) {
   const networks = makeNetworks();
   const context = { failures: 0, shots, chromium, folder, networks };
@@ -206,6 +178,8 @@ async function checkAll(context) {
   await openPhone(context, wearer.link, home);
   await openExpert(context, pilot.link, home);
   await marks(context);
+  await shot(context, context.expert, 'marks-expert');
+  await shot(context, context.phone, 'marks-phone');
   await latency(context);
   if (context.networks) await cut(context);
   await revocation(context, wearer.id, pilot.id);
@@ -254,84 +228,10 @@ async function openExpert(context, link, home) {
   const viewer = JSON.parse(saccade('invite', '--role', 'viewer', '--json')).link;
   const grpc = context.server.grpc.replace('0.0.0.0', networks?.host);
   const whom = ['--trust', join(context.folder, 'root.pem'), '--invite', viewer, '--server', grpc];
+  context.whom = whom;
   const status = saccade(...whom, 'status').replace(/\s+/g, ' ');
   check('`saccade status` says tracking', /tracking/.test(status), status.slice(0, 90));
   await shot(context, context.expert, 'expert');
-}
-
-/** Clicks objects in the expert's video; the phone draws the marks over its own picture. */
-async function marks(context) {
-  const { expert, phone, truth, check } = context;
-  await expert.press('c');
-  await expert.enlarge('video');
-  const placed = [];
-  for (const end = Date.now() + 90_000; placed.length < MARKS && Date.now() < end; ) {
-    const mark = await placeMark(context, placed);
-    if (mark) placed.push(mark);
-  }
-  await shot(context, expert, 'marks-expert');
-  // On the phone, over its own picture: where each mark is, against where truth has it in that very picture.
-  const errors = placed.map(() => []);
-  const seen = new Set();
-  for (const end = Date.now() + 10_000; Date.now() < end; await sleep(30)) {
-    const shown = await shownBy(phone.page);
-    const frame = truth.frame(shown.number);
-    if (!frame || !shown.frameId || seen.has(shown.frameId)) continue;
-    seen.add(shown.frameId);
-    placed.forEach(({ point }, i) => {
-      const at = project(context.camera, inCamera(frame.world_from_camera, point));
-      if (!at || at[0] < 0 || at[1] < 0 || at[0] > 639 || at[1] > 479) return;
-      const away = shown.marks.map((pixel) => length(minus(pixel, at))).filter((px) => px >= 0);
-      if (away.length > 0) errors[i].push(Math.min(...away));
-    });
-  }
-  await shot(context, phone, 'marks-phone');
-  const each = errors.map((list) => median(list));
-  check(
-    "marks placed in the expert's video are where truth has them on the phone, each median within 8 px",
-    placed.length === MARKS && each.every((error) => error < 8) && seen.size > 10,
-    `${placed.length} marks, ${seen.size} pictures, by mark ${each.map((e) => e?.toFixed(1)).join(', ')} px`,
-  );
-}
-
-/** One cube on an object; undefined if it was missed, as the camera moves on, or refused. */
-async function placeMark({ expert, truth, camera }, placed) {
-  const numbers = new Map(); // of the expert's frames
-  const look = async () => {
-    const { frameId, number } = await shownBy(expert.page);
-    numbers.set(frameId, number);
-    return number;
-  };
-  const { left, top, scale, width, height } = await expert.look();
-  const target = truth.frame(await look())?.objects.find(({ name, visible, pixel }) => {
-    if (!visible || !pixel || placed.some((mark) => mark.name === name)) return false;
-    const [u, v] = pixel;
-    return u > 60 && v > 60 && u < width - 60 && v < height - 60;
-  });
-  if (!target) return undefined;
-  const before = await expert.annotationIds();
-  const [u, v] = target.pixel;
-  const looking = (async () => {
-    for (let i = 0; i < 8; ++i) await look();
-  })();
-  await expert.click([left + (u + 0.5) * scale, top + (v + 0.5) * scale]);
-  await looking;
-  const { id, refused } = await expert.newAnnotation(before);
-  if (!id) {
-    if (process.env['SACCADE_VERBOSE']) console.log(`      ${target.name}: ${refused}`);
-    return undefined;
-  }
-  const { id: frameId, pixel } = await expert.pressed();
-  const frame = truth.frame(numbers.get(frameId));
-  const object = frame?.objects.find(({ name }) => name === target.name);
-  if (object?.pixel && object.visible && length(minus(object.pixel, pixel)) < AIM_PX) {
-    const depth = inCamera(frame.world_from_camera, object.point_in_world_m)[2];
-    const point = inWorld(frame.world_from_camera, unproject(camera, pixel, depth));
-    return { id, name: target.name, point };
-  }
-  await expert.press('Control+z'); // missed
-  await sleep(500);
-  return undefined;
 }
 
 async function latency({ check, phone, expert }) {

@@ -1,13 +1,6 @@
-import { create, fromBinary, type MessageInitShape, toBinary } from '@bufbuild/protobuf';
-import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import {
-  WearerCodec,
-  WearerDownstreamSchema,
-  type WearerTracked,
-  WearerTrackedSchema,
-  type WearerUpstream,
-  WearerUpstreamSchema,
-} from '../../src/gen/saccade/v1/wearer_pb';
+import { create } from '@bufbuild/protobuf';
+import { describe, expect, it } from 'vitest';
+import { type WearerTracked, WearerTrackedSchema } from '../../src/gen/saccade/v1/wearer_pb';
 import { Camera, type Intrinsics } from '../../src/geometry/camera';
 import { IDENTITY } from '../../src/geometry/rigid3';
 import { uprightView } from '../../src/geometry/turned_view';
@@ -20,7 +13,6 @@ import { FrameTimes, refusalWords } from '../../src/uplink/camera';
 import { chooseCodec } from '../../src/uplink/coder';
 import { motionOf } from '../../src/uplink/motion';
 import { SentRing } from '../../src/uplink/sent';
-import { Uplink } from '../../src/uplink/socket';
 import { cropOf, swapped, swaps, type Turn, turnOf } from '../../src/uplink/turn';
 import { WearMeter, wearTimes } from '../../src/uplink/wear_latency';
 
@@ -273,165 +265,5 @@ describe('statusWords', () => {
     expect(away.advice).toMatch(/phone may be away/);
     expect(statusWords({ ...input, poseMs: 6000, paused: true }).text).toBe('picture paused');
     expect(statusWords({ ...input, poseMs: 6000, sourceEnded: true }).text).toBe('recording ended');
-  });
-});
-
-/** The browser's end of a socket, and what the page sent through it. */
-class FakeSocket {
-  static readonly all: FakeSocket[] = [];
-  readyState = 1;
-  bufferedAmount = 0;
-  binaryType = '';
-  closed = false;
-  onopen: (() => void) | undefined;
-  onclose: (() => void) | undefined;
-  onmessage: ((event: { data: ArrayBuffer }) => void) | undefined;
-  readonly sent: WearerUpstream[] = [];
-
-  constructor(readonly url: string) {
-    FakeSocket.all.push(this);
-  }
-  send(bytes: Uint8Array): void {
-    this.sent.push(fromBinary(WearerUpstreamSchema, bytes));
-  }
-  close(): void {
-    this.closed = true;
-  }
-  say(message: MessageInitShape<typeof WearerDownstreamSchema>): void {
-    const bytes = toBinary(WearerDownstreamSchema, create(WearerDownstreamSchema, message));
-    this.onmessage?.({ data: bytes.slice().buffer });
-  }
-}
-
-describe('Uplink', () => {
-  beforeEach(() => {
-    vi.useFakeTimers();
-    vi.stubGlobal('WebSocket', { OPEN: 1 });
-    FakeSocket.all.length = 0;
-  });
-  afterEach(() => {
-    vi.useRealTimers();
-    vi.unstubAllGlobals();
-  });
-
-  const open = () => {
-    const events = { welcome: vi.fn(), tracked: vi.fn(), keyFrameWanted: vi.fn() };
-    const uplink = new Uplink({
-      url: 'wss://server/wear/upstream',
-      token: () => 'p1.secret',
-      phoneId: 'phone',
-      cameraLabel: () => 'back camera',
-      events,
-      nowMs: () => Date.now(),
-      makeSocket: (url) => new FakeSocket(url) as unknown as WebSocket,
-      random: () => 0,
-    });
-    return { uplink, events };
-  };
-  const newest = (): FakeSocket => {
-    const socket = FakeSocket.all.at(-1);
-    if (!socket) throw new Error('none');
-    return socket;
-  };
-  const letIn = (socket = newest()): void => {
-    socket.onopen?.();
-    socket.say({ message: { case: 'welcome', value: { ...WIDE, fpsHz: 30 } } });
-  };
-  const coded = {
-    timestamp: 1,
-    keyFrame: true,
-    codec: WearerCodec.H264,
-    size: WIDE,
-    data: new Uint8Array([1, 2, 3]),
-  };
-
-  it('says who it is first, in the message and not in the address', () => {
-    const { uplink } = open();
-    const socket = newest();
-    expect(socket.url).not.toMatch(/secret/);
-    expect(uplink.sendPicture(1, 1000, coded, 0)).toBe(false);
-    letIn();
-    expect(socket.sent[0]?.message.value).toMatchObject({ token: 'p1.secret', phoneId: 'phone' });
-    expect(uplink.live).toBe(true);
-    expect(uplink.sendPicture(7, 1234.5, coded, 90)).toBe(true);
-    const picture = socket.sent.at(-1)?.message.value;
-    expect(picture).toMatchObject({ pictureId: 7n, captureNs: 1_234_500_000n, clockwiseDeg: 90 });
-    uplink.stop();
-  });
-
-  it('comes back after growing pauses of at most a second, and at once when told to', () => {
-    const { uplink } = open();
-    letIn();
-    const pauses = [250, 500, 1000, 1000];
-    for (const pause of pauses) {
-      const count = FakeSocket.all.length;
-      newest().onclose?.();
-      expect(uplink.state.kind).toBe('reconnecting');
-      vi.advanceTimersByTime(pause - 1);
-      expect(FakeSocket.all).toHaveLength(count);
-      vi.advanceTimersByTime(1);
-      expect(FakeSocket.all).toHaveLength(count + 1);
-    }
-    newest().onclose?.();
-    const count = FakeSocket.all.length;
-    uplink.hurry();
-    expect(FakeSocket.all).toHaveLength(count + 1);
-    letIn();
-    expect(uplink.live).toBe(true);
-    uplink.stop();
-  });
-
-  it('gives up a link that is silent, and does not wait for its close', () => {
-    const { uplink } = open();
-    letIn();
-    const dead = newest();
-    vi.advanceTimersByTime(5400);
-    expect(uplink.live).toBe(false);
-    expect(dead.closed).toBe(true);
-    expect(newest()).not.toBe(dead);
-    letIn();
-    dead.onclose?.(); // minutes later: it is not ours any more
-    expect(uplink.live).toBe(true);
-    uplink.stop();
-  });
-
-  it('stays out once it is refused for good, and tries again where it is not', () => {
-    const { uplink } = open();
-    newest().onopen?.();
-    newest().say({
-      message: { case: 'refused', value: { reason: 'another phone', final: false } },
-    });
-    expect(uplink.state).toMatchObject({ kind: 'reconnecting', reason: 'another phone' });
-    vi.advanceTimersByTime(1000);
-    newest().say({ message: { case: 'refused', value: { reason: 'revoked', final: true } } });
-    expect(uplink.state).toEqual({ kind: 'refused', reason: 'revoked' });
-    const count = FakeSocket.all.length;
-    vi.advanceTimersByTime(60_000);
-    expect(FakeSocket.all).toHaveLength(count);
-  });
-
-  it('echoes the pong, so that the server can set its clock', () => {
-    const { uplink } = open();
-    letIn();
-    newest().say({ message: { case: 'pong', value: { echoSentNs: 1n, serverNs: 4711n } } });
-    vi.advanceTimersByTime(1000);
-    const ping = newest().sent.at(-1)?.message;
-    expect(ping?.case).toBe('ping');
-    expect(ping?.value).toMatchObject({ echoServerNs: 4711n });
-    uplink.stop();
-  });
-
-  it('hears of tracked pictures and of wanted key frames', () => {
-    const { uplink, events } = open();
-    letIn();
-    newest().say({ message: { case: 'tracked', value: { pictureId: 9n } } });
-    newest().say({ message: { case: 'keyFrameWanted', value: {} } });
-    newest().say({ message: { case: 'problem', value: { text: 'pictures of 3x2 came' } } });
-    expect(events.tracked).toHaveBeenCalledOnce();
-    expect(events.keyFrameWanted).toHaveBeenCalledOnce();
-    expect(uplink.problem).toMatch(/3x2/);
-    newest().say({ message: { case: 'tracked', value: { pictureId: 10n } } });
-    expect(uplink.problem).toBe('');
-    uplink.stop();
   });
 });
