@@ -15,13 +15,16 @@ find_package(OpenSSL 3 REQUIRED)
 find_package(PkgConfig REQUIRED)
 # What firms' providers sign (OIDC), and asking them over HTTP.
 pkg_check_modules(Cjose REQUIRED IMPORTED_TARGET cjose)
+pkg_check_modules(Alsa REQUIRED IMPORTED_TARGET alsa)
 pkg_check_modules(Curl REQUIRED IMPORTED_TARGET libcurl)
 pkg_check_modules(OpenH264 REQUIRED IMPORTED_TARGET openh264)
 # saccade-client alone. libimgui.a holds its backends for GLFW and OpenGL 3, which loads OpenGL itself.
 find_package(glfw3 3.3 REQUIRED)
 pkg_check_modules(Imgui REQUIRED IMPORTED_TARGET imgui)
+pkg_check_modules(Opus REQUIRED IMPORTED_TARGET opus)
 pkg_check_modules(OSMesa REQUIRED IMPORTED_TARGET osmesa)
 pkg_check_modules(Seccomp REQUIRED IMPORTED_TARGET libseccomp)
+pkg_check_modules(SpeexDsp REQUIRED IMPORTED_TARGET speexdsp)
 # Of saccade-decode alone (architecture, section 7).
 pkg_check_modules(VideoDecoder REQUIRED IMPORTED_TARGET libavformat libavcodec libswscale libavutil)
 pkg_check_modules(Zstd REQUIRED IMPORTED_TARGET libzstd)

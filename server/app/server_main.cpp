@@ -17,6 +17,7 @@
 #include "server/app/server_config.hpp"
 #include "server/app/shutdown.hpp"
 #include "server/app/view_encoder.hpp"
+#include "server/audio/wearer_voice.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
@@ -209,10 +210,21 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   (*door)->Watch(
       [&](const ServerIdentity& renewed) { return Renew(renewed, config, **rpc, **gateway); });
   const absl::Cleanup no_watch = [&door] { (*door)->Watch(nullptr); };
+  std::unique_ptr<WearerVoice> voice;
+  if (!config.audio_in.empty() || !config.audio_out.empty()) {
+    shutdown.SetPhase("opening the audio devices");
+    auto opened = WearerVoice::Start({.capture = config.audio_in,
+                                      .playback = config.audio_out,
+                                      .token = (*door)->access().owner_token()},
+                                     (*rpc)->InProcessChannel());
+    if (!opened.ok()) return opened.status();
+    voice = *std::move(opened);
+  }
   (*engine)->Start();
   shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());
   shutdown.Wait(config.run_for_s);
+  voice.reset();
   // Streams end first, then browsers, then the threads that answer commands, then calls.
   hub.CloseAll(absl::UnavailableError("the server is shutting down"));
   (*gateway)->Stop();

@@ -43,15 +43,18 @@ struct Home {
 };
 const std::vector<Home>& Homes() {
   static const std::vector<Home> homes = {
-      {"*.grpc.pb.h", {"server/rpc", "client/net"}},
-      {"*.pb.h", {"shared/wire", "server/rpc", "server/wear", "client/net"}},
-      {"grpcpp/", {"server/rpc", "server/gateway", "server/app", "client/net"}},
+      {"*.grpc.pb.h", {"server/rpc", "server/audio", "client/net"}},
+      {"*.pb.h", {"shared/wire", "server/rpc", "server/wear", "server/audio", "client/net"}},
+      {"grpcpp/", {"server/rpc", "server/audio", "server/gateway", "server/app", "client/net"}},
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},
       {"openssl/", {"server/identity", "client/net"}},
       {"cjose/", {"server/identity"}},
       {"curl/", {"server/identity"}},
       {"qrencode.h", {"shared/io"}},
+      {"alsa/", {"server/audio"}},
+      {"opus.h", {"server/audio"}},
+      {"speex/", {"server/audio"}},
       {"wels/", {"server/encode", "client/decode"}},
       {"GL/osmesa.h", {"server/gl"}},
       {"EGL/", {"server/gl"}},
