@@ -17,7 +17,7 @@ using std::string_view;
 constexpr auto kServerOrder = std::to_array<string_view>(
     {"pipeline", "mount",   "gl",      "capture", "sim",      "features", "markers", "filter",
      "map",      "tracker", "anchors", "gaze",    "wearable", "overlay",  "encode",  "store",
-     "identity", "rpc",     "wear",    "gateway", "eval",     "app"});
+     "identity", "rpc",     "wear",    "audio",   "gateway",  "eval",     "app"});
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder = std::to_array<string_view>(
