@@ -188,10 +188,20 @@ void Engine::TellGap(const Frame& before, const Frame& frame) {
   if (!IsGap(before.capture_time_ns, frame.capture_time_ns)) return;
   if (gap_told_ns_ != 0 && MonotonicNow() - gap_told_ns_ < kGapAgain) return;
   gap_told_ns_ = MonotonicNow();
-  Log(absl::StrFormat(
-      "source %s: frame %d is stamped %.6g s after frame %d (stamps count "
-      "nanoseconds; was the clock set?): tracking starts anew",
-      facts_.source, frame.id, Seconds(frame.capture_time_ns - before.capture_time_ns), before.id));
+  const Timestamp gap_ns = frame.capture_time_ns - before.capture_time_ns;
+  const auto passed_over = static_cast<std::int64_t>(frame.id - before.id) - 1;
+  // Pictures that came and could not be taken are no fault of the stamps.
+  if (passed_over > 0 && gap_ns > 0 && !IsGap(0, gap_ns / (passed_over + 1))) {
+    Log(
+        absl::StrFormat("source %s: %d pictures (%.1f s) were passed over before frame %d: this "
+                        "machine is too busy; tracking starts anew",
+                        facts_.source, passed_over, Seconds(gap_ns), frame.id));
+    return;
+  }
+  Log(
+      absl::StrFormat("source %s: frame %d is stamped %.6g s after frame %d (stamps count "
+                      "nanoseconds; was the clock set?): tracking starts anew",
+                      facts_.source, frame.id, Seconds(gap_ns), before.id));
 }
 
 std::shared_ptr<const GazeSnapshot> Engine::gaze() const {
