@@ -11,14 +11,17 @@ import { RateMeter } from '../session/latency';
 import { newUuid } from '../session/uuid';
 import type { Session } from '../session/session';
 import { isPlaced, type Pose } from '../session/types';
+import { VoiceRoom } from '../talk/voice_room';
 import { CameraStream } from '../uplink/camera';
 import { watchMotion } from '../uplink/motion';
 import type { Sent } from '../uplink/sent';
 import { Uplink } from '../uplink/socket';
 import { WearCamera } from '../uplink/wear_camera';
 import { WEAR_STAGES, WearMeter, wearTimes } from '../uplink/wear_latency';
+import { Chime } from './chime';
 import { storage } from './dom';
 import { allMarks } from './marks';
+import { NewsWatch } from './news';
 import { Painter } from './painter';
 import { PauseControl } from './pause_control';
 import { WearScreen } from './wear_screen';
@@ -26,6 +29,7 @@ import { latencyWords, wearWords } from './wear_words';
 import { presenceWords, statusWords } from './words';
 
 const SHOWN_MS = 400; // without a tracked picture for so long, the camera's own is shown
+const NEWS_MS = 1500; // how long news is lit
 const PHONE = 'saccade.phone';
 
 /** This phone is the camera: its pictures go to the server, and come back as marks over them. */
@@ -35,6 +39,9 @@ export class WearApp {
   private readonly painter = new Painter();
   private readonly camera: WearCamera;
   private readonly pause: PauseControl;
+  private readonly room: VoiceRoom;
+  private readonly chime = new Chime();
+  private readonly watch: NewsWatch;
   private uplink: Uplink | undefined;
   private intrinsics: CameraIntrinsics | undefined;
   private next: { tracked: WearerTracked; arrivedMs: number } | undefined;
@@ -55,6 +62,13 @@ export class WearApp {
     this.screen.start.addEventListener('click', () => void this.begin());
     this.pause = new PauseControl(session);
     this.screen.pause.addEventListener('click', () => this.pause.toggle());
+    this.room = new VoiceRoom(session);
+    this.watch = new NewsWatch(session, () => this.chime.play());
+    this.screen.voice.addEventListener('click', () => {
+      if (this.room.state === 'off') void this.room.join();
+      else this.room.leave();
+    });
+    this.screen.mute.addEventListener('click', () => this.room.toggleMute());
     this.screen.lens.addEventListener('change', () => {
       this.camera.deviceId = this.screen.lens.value;
       void this.openCamera();
@@ -129,6 +143,7 @@ export class WearApp {
   private frame(): void {
     requestAnimationFrame(() => this.frame());
     this.connect();
+    this.watch.update();
     this.draw();
     this.update();
   }
@@ -188,7 +203,7 @@ export class WearApp {
       uplink: uplink?.state,
       camera: camera.state,
       paused: this.pause.paused,
-      problem: this.pause.problem || (uplink?.problem ?? ''),
+      problem: this.pause.problem || this.room.problem || (uplink?.problem ?? ''),
       untrackedMs: nowMs - this.trackedMs,
       tracking: {
         text: [`${status.mark} ${status.text}`, status.advice].filter(Boolean).join(': '),
@@ -197,6 +212,7 @@ export class WearApp {
       nowMs,
     });
     const held = camera.held.encoder + camera.held.network + camera.held.server;
+    const { newest } = this.watch;
     this.screen.update({
       words,
       started: this.started && camera.state.kind !== 'failed',
@@ -213,6 +229,13 @@ export class WearApp {
         camera.codecWords,
         held,
       ),
+      voice: {
+        open: this.room.state !== 'off',
+        microphone: this.room.hasMicrophone,
+        muted: this.room.muted,
+      },
+      news: newest?.text ?? '',
+      lit: newest !== undefined && performance.now() - newest.atMs < NEWS_MS,
     });
     this.tellTests(held);
   }
@@ -228,6 +251,7 @@ export class WearApp {
     const { dataset } = this.element;
     dataset['uplink'] = this.uplink?.state.kind ?? 'none';
     dataset['held'] = String(held);
+    dataset['heard'] = this.room.figures;
     const stages = [...WEAR_STAGES, 'total' as const].map((stage) => {
       const at = (q: number): number => Math.round(this.latency.percentile(stage, q) ?? -1);
       return `${stage} ${at(0.5)}/${at(0.95)}`;

@@ -10,6 +10,9 @@ export interface WearState {
   readonly paused: boolean;
   readonly watchers: string;
   readonly latency: string;
+  readonly voice: { readonly open: boolean; readonly microphone: boolean; readonly muted: boolean };
+  readonly news: string; // what was said or placed last
+  readonly lit: boolean; // just now
 }
 
 /** What the phone's page consists of. */
@@ -17,11 +20,14 @@ export class WearScreen {
   readonly picture = h('canvas', { class: 'picture' });
   readonly start = h('button', { type: 'button', class: 'start' }, 'Start');
   readonly pause = h('button', { type: 'button', class: 'pause' });
+  readonly voice = h('button', { type: 'button', class: 'voice' });
+  readonly mute = h('button', { type: 'button', class: 'mute' });
   readonly lens = h('select', { 'aria-label': 'Lens' });
   readonly element: HTMLElement;
   private readonly line = h('p', { class: 'line', role: 'status' });
   private readonly watchers = h('p', { class: 'watchers' });
   private readonly failure = h('p', { class: 'failure', role: 'alert' });
+  private readonly news = h('p', { class: 'news', role: 'status', dir: 'auto' });
   private readonly latency = h('p', { class: 'latency' });
   private readonly intro: HTMLElement;
   private readonly bar: HTMLElement;
@@ -35,7 +41,7 @@ export class WearScreen {
       h(
         'p',
         {},
-        'Experts who were invited see what its camera sees, and place marks in it that you see here. Nothing is heard.',
+        'Experts who were invited see what its camera sees, and place marks in it that you see here. Nothing is heard before you join the voice.',
       ),
       h('p', {}, 'Tap Start and allow the camera. The screen stays on until you leave this page.'),
       this.failure,
@@ -45,6 +51,8 @@ export class WearScreen {
       'div',
       { class: 'bar' },
       this.latency,
+      this.news,
+      h('div', { class: 'row' }, this.voice, this.mute),
       h('div', { class: 'row' }, this.lens, this.pause),
     );
     this.element = h(
@@ -83,7 +91,7 @@ export class WearScreen {
   }
 
   update(state: WearState): void {
-    const { words, started, refused, failure, paused, watchers, latency } = state;
+    const { words, started, refused, failure, paused, watchers, latency, voice } = state;
     setText(this.line, words.text);
     setClass(this.line, 'warn', words.warn);
     setText(this.watchers, watchers);
@@ -94,6 +102,13 @@ export class WearScreen {
     setClass(this.lens, 'hidden', this.lens.options.length < 2);
     setText(this.pause, paused ? '▶ Go on' : 'Ⅱ Pause picture');
     setText(this.latency, latency);
+    setText(this.news, state.news);
+    setClass(this.news, 'lit', state.lit);
+    setText(this.voice, voice.open ? 'Leave voice' : 'Join voice');
+    this.voice.setAttribute('aria-pressed', String(voice.open));
+    setClass(this.mute, 'hidden', !voice.microphone);
+    setText(this.mute, voice.muted ? 'Unmute' : 'Mute');
+    this.mute.setAttribute('aria-pressed', String(voice.muted));
     setClass(this.element, 'stale', refused);
     setClass(this.element, 'paused', paused);
   }

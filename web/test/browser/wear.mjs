@@ -181,6 +181,7 @@ async function checkAll(context) {
   await shot(context, context.expert, 'marks-expert');
   await shot(context, context.phone, 'marks-phone');
   await latency(context);
+  await voice(context);
   if (context.networks) await cut(context);
   await revocation(context, wearer.id, pilot.id);
   const errors = [...context.phone.errors, ...context.expert.errors];
@@ -248,6 +249,29 @@ async function latency({ check, phone, expert }) {
     .innerText()
     .catch(() => '');
   console.log(`      expert: ${strip.replace(/\s+/g, ' ')}`);
+}
+
+/** Chromium's fake microphone beeps once a second. */
+async function voice({ check, phone, expert }) {
+  const played = async (page, selector) => {
+    const text = (await page.locator(selector).getAttribute('data-heard')) ?? '';
+    return Number(text.split(' ')[0] || 0);
+  };
+  await phone.page.locator('.voice').click();
+  await expert.press('8');
+  const ways = [
+    ['expert', expert.page, '.voice-bar'],
+    ['phone', phone.page, '.wear-view'],
+  ];
+  for (const [who, page, selector] of ways) {
+    let frames = 0;
+    for (const end = Date.now() + 20_000; frames < 25 && Date.now() < end; await sleep(200)) {
+      frames = await played(page, selector);
+    }
+    check(`the ${who} hears the other`, frames >= 25, `${frames} frames of 20 ms`);
+  }
+  await phone.page.locator('.voice').click();
+  await expert.press('8');
 }
 
 async function cut(context) {
