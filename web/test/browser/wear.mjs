@@ -8,6 +8,7 @@ import { dirname, join } from 'node:path';
 import { Expert } from './expert.mjs';
 import { trust } from './invite.mjs';
 import { startServer, Truth } from './server.mjs';
+import { voice } from './wear_voice.mjs';
 import { BITS, BLOCK, marks, MARKS } from './wear_marks.mjs';
 
 const FRAMES = 300; // played to and fro: 20 s without a jump
@@ -249,29 +250,6 @@ async function latency({ check, phone, expert }) {
     .innerText()
     .catch(() => '');
   console.log(`      expert: ${strip.replace(/\s+/g, ' ')}`);
-}
-
-/** Chromium's fake microphone beeps once a second. */
-async function voice({ check, phone, expert }) {
-  const played = async (page, selector) => {
-    const text = (await page.locator(selector).getAttribute('data-heard')) ?? '';
-    return Number(text.split(' ')[0] || 0);
-  };
-  await phone.page.locator('.voice').click();
-  await expert.press('8');
-  const ways = [
-    ['expert', expert.page, '.voice-bar'],
-    ['phone', phone.page, '.wear-view'],
-  ];
-  for (const [who, page, selector] of ways) {
-    let frames = 0;
-    for (const end = Date.now() + 20_000; frames < 25 && Date.now() < end; await sleep(200)) {
-      frames = await played(page, selector);
-    }
-    check(`the ${who} hears the other`, frames >= 25, `${frames} frames of 20 ms`);
-  }
-  await phone.page.locator('.voice').click();
-  await expert.press('8');
 }
 
 async function cut(context) {
