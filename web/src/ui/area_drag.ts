@@ -22,7 +22,7 @@ export class AreaDrag implements Drag {
 
   move(x: number, y: number): void {
     const { aim, pane, state, from } = this;
-    this.to = aim.pixelAt(pane, x, y) ?? this.to;
+    this.to = aim.pixelNear(pane, x, y);
     state.area = { pane, from, to: this.to };
     state.moved();
   }

@@ -153,6 +153,7 @@ async function nameIsAskedOnce(context) {
   await page.locator('.app[data-first-picture-ms]').waitFor();
   await tracked(context);
   const again = await page.locator('dialog[open]').count();
+  await person.waitFor({ state: 'attached', timeout: 10_000 }); // he was gone for the reload
   const key = await page.evaluate(() => window.localStorage.getItem('saccade.person'));
   const colours = await context.ann.page
     .locator('.participant .person')

@@ -105,14 +105,14 @@ export async function byKeyboard(context) {
   await ann.press('Escape');
   // Every button says its key.
   const silent = await page
-    .locator('nav button')
+    .locator('nav button[data-control]')
     .evaluateAll((all) => all.filter((each) => !each.querySelector('kbd')?.textContent).length);
   check('every tool shows its key', silent === 0, `${silent} do not`);
 }
 
 /** What is drawn of others on a page's video, as it says. */
 export const pointersOn = (page) =>
-  page.locator('.video canvas.marks').evaluate((canvas) => canvas.dataset.pointers ?? '');
+  page.locator('.video canvas.pointers').evaluate((canvas) => canvas.dataset.pointers ?? '');
 
 async function laserByKeys(context) {
   const { ann, bo, check } = context;
