@@ -6,7 +6,6 @@ import type { Session } from '../session/session';
 import { pageNowMs } from '../session/clock';
 import { type FeatureState, type FrameFacts, isPlaced } from '../session/types';
 import type { AppState } from './app_state';
-import { Darkness } from './darkness';
 import { arrowLabel } from './gaze_words';
 import { Pane } from './pane';
 import type { PictureCache } from './picture_cache';
@@ -21,7 +20,6 @@ const STALE_MS = 1000;
 /** The live picture, or a frozen one, with the marks that belong to exactly that frame. */
 export class VideoPane extends Pane {
   private still: Still | undefined;
-  private readonly darkness = new Darkness();
 
   constructor(session: Session, player: Player, state: AppState, pictures: PictureCache) {
     const words = { className: 'video', label: 'Live video', title: 'Video' };
@@ -237,8 +235,7 @@ export class VideoPane extends Pane {
     else if (player.shown && stale) text = `picture is ${(age / 1000).toFixed(0)} s old`;
     else if (!player.shown && session.live) text = 'waiting for the first picture';
     else if (player.shown) {
-      this.darkness.look(player.canvas, nowMs);
-      if (this.darkness.black) text = 'The picture is black: uncover the lens, or make light';
+      if (player.darkness.black) text = 'The picture is black: uncover the lens, or make light';
       else if (session.live) text = lostWords(session.pose);
     }
     this.setNote(text);

@@ -122,9 +122,8 @@ async function fromOutside(context) {
   await observe(ann.page);
   const sent = [];
   const strokeId = globalThis.crypto.randomUUID();
-  const at = (context.placed ?? (await context.annotations.list({})).annotations).find(
-    ({ anchor }) => anchor?.pointInWorldM,
-  ).anchor.pointInWorldM;
+  const { map } = await context.map.get({});
+  const at = map.upserted.find(({ depthKnown }) => depthKnown).pointInWorldM;
   for (let i = 0; i < 24; ++i) {
     const value = { x: at.x + 0.02 * (i % 5), y: at.y, z: at.z };
     sent.push(Date.now());

@@ -1,5 +1,6 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
+//        [--only CHECK,CHECK]  (of tools)
 //        [--part page|gaze|dots|person|invite|layout|tools|wear|waiting|talk|oidc]   (gaze: the turning of the head; dots: measured features
 //        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
 //        from another address than loopback where this may make a network namespace; wear: a phone as the
@@ -23,6 +24,8 @@ const { values: options } = parseArgs({
     seed: { type: 'string', default: '1' },
     shots: { type: 'string' },
     part: { type: 'string', default: 'page' },
+    only: { type: 'string' },
+    count: { type: 'string' },
   },
 });
 
@@ -50,6 +53,10 @@ const PARTS = {
   wear: async () => (await import('./wear.mjs')).runWear,
   waiting: async () => (await import('./waiting.mjs')).runWaiting,
   talk: async () => (await import('./talk.mjs')).runTalk,
+  clicks: async () => (await import('./clicks.mjs')).runClicks,
+  shapes: async () => (await import('./drawn_shapes.mjs')).runShapes,
+  keys: async () => (await import('./keyboard.mjs')).runKeyboard,
+  shots: async () => (await import('./shots.mjs')).runShots,
   oidc: async () => (await import('./oidc.mjs')).runOidc,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);

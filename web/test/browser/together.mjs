@@ -17,18 +17,22 @@ import {
 } from './tools.mjs';
 import { pointersOn } from './tools_keys.mjs';
 
+const CHECKS = {
+  laser,
+  laserInOtherViews,
+  growingInk,
+  undoIsThePersons,
+  concurrent,
+  several,
+  copied,
+  locked,
+  shownWhere,
+  dropped,
+  viewer,
+};
+
 export async function togetherChecks(context) {
-  await laser(context);
-  await laserInOtherViews(context);
-  await growingInk(context);
-  await undoIsThePersons(context);
-  await concurrent(context);
-  await several(context);
-  await copied(context);
-  await locked(context);
-  await shownWhere(context);
-  await dropped(context);
-  await viewer(context);
+  for (const [name, run] of Object.entries(CHECKS)) if (context.wants(name)) await run(context);
 }
 
 /** In the frozen picture and in the map as well. */

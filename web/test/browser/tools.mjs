@@ -20,13 +20,14 @@ const OPEN = { viewport: { width: 1000, height: 640 }, prefix: ['nice', '-n', '5
 
 export const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-export async function runTools({ server: binary, chromium, seed, shots, folder }) {
+export async function runTools({ server: binary, chromium, seed, shots, folder, only }) {
   const server = await startServer(binary, [
     ...['--source', `sim:desk?seed=${seed}&motion=stand&fps=10`],
     ...['--data-dir', join(folder, 'tools-data')],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);
   const context = { failures: 0, shots, url: server.http, folder, chromium };
+  context.wants = (name) => !only || only.split(',').includes(name);
   context.check = (name, ok, figures) => {
     console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
     if (!ok) ++context.failures;
@@ -43,11 +44,11 @@ export async function runTools({ server: binary, chromium, seed, shots, folder }
     await context.ann.page.locator('canvas.map[data-eye]').waitFor();
     await nameIsAskedOnce(context);
     await context.ann.enlarge('video');
-    await byMouse(context);
-    await byKeyboard(context);
+    if (context.wants('mouse')) await byMouse(context);
+    if (context.wants('keys')) await byKeyboard(context);
     await togetherChecks(context);
-    await benchmark(context);
-    await sizes(context);
+    if (context.wants('crowd')) await benchmark(context);
+    if (context.wants('sizes')) await sizes(context);
     for (const name of ['ann', 'bo']) {
       const { errors } = context[name];
       context.check(`page errors, ${name}`, errors.length === 0, errors.join('; ') || 'none');
