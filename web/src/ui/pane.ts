@@ -118,7 +118,7 @@ export abstract class Pane {
   protected shownPictures(view: View, marks: readonly Mark[]): ShownPicture[] {
     const shown: ShownPicture[] = [];
     for (const mark of marks) {
-      if (mark.shape !== 'picture') continue;
+      if (mark.shape !== 'picture' || mark.hollow) continue; // not trusted: its outline alone
       const annotation = this.session.annotations.get(mark.id);
       const image = annotation && this.pictures.get(annotation);
       if (!image) continue;

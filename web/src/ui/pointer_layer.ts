@@ -72,8 +72,8 @@ export class PointerLayer extends Surface {
       this.context.fill();
     };
     disc(7, HALO);
-    disc(5, colour);
-    disc(1.8, LINE);
+    disc(4, colour);
+    disc(1.5, LINE);
   }
 }
 

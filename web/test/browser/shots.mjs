@@ -1,0 +1,145 @@
+// Pictures of the page and of the wearer's view at seven sizes, light and dark, with people, marks of every
+// shape, messages and somebody who points: to be looked at. Makes files, checks only that the pages came.
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { createClient } from '@connectrpc/connect';
+import { createGrpcWebTransport } from '@connectrpc/connect-web';
+import { AnnotationService, AnnotationShape } from '../../src/gen/saccade/v1/annotation_pb.js';
+import { PointerKind, PointerService } from '../../src/gen/saccade/v1/pointer_pb.js';
+import { Role, SessionService } from '../../src/gen/saccade/v1/session_pb.js';
+import { TalkService } from '../../src/gen/saccade/v1/talk_pb.js';
+import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
+import { Expert } from './expert.mjs';
+import { samplePng } from './files.mjs';
+import { SIZES } from './layout.mjs';
+import { startServer } from './server.mjs';
+
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const STRAIGHT = { x: 0, y: Math.sin(0.35), z: 0, w: Math.cos(0.35) };
+
+/** In the picture's pixels (640 x 480). */
+const MARKS = [
+  { shape: AnnotationShape.CUBE, at: [250, 210] },
+  { shape: AnnotationShape.NOTE, at: [330, 330], text: 'oil: check the level first' },
+  { shape: AnnotationShape.ARROW, at: [470, 260], sizeM: 0.08 },
+  { shape: AnnotationShape.PIN, at: [130, 300], text: 'leaks', sizeM: 0.08 },
+  { shape: AnnotationShape.PIN, at: [180, 250], sizeM: 0.08 },
+  { shape: AnnotationShape.MEASURE, at: [240, 120], to: [390, 140] },
+  {
+    ...{ shape: AnnotationShape.BOX, at: [540, 330] },
+    ...{ extentM: { x: 0.14, y: 0.1, z: 0.08 }, worldFromMark: STRAIGHT },
+  },
+  { shape: AnnotationShape.PICTURE, at: [110, 190], sizeM: 0.16, text: 'wiring' },
+  {
+    ...{ shape: AnnotationShape.CHECK_LIST, at: [420, 400], text: 'Service', sizeM: 0.08 },
+    checkItems: ['close the valve', 'open the lid', 'change the filter'],
+  },
+  {
+    ...{ shape: AnnotationShape.INK, at: [300, 250] },
+    inkPx: Array.from({ length: 40 }, (_, i) => ({
+      u: 300 + 45 * Math.cos(i / 6.2),
+      v: 260 + 30 * Math.sin(i / 6.2),
+    })),
+  },
+];
+
+export async function runShots({ server: binary, chromium, seed, shots, folder }) {
+  if (!shots) throw new Error('--shots: say which folder the pictures go to');
+  mkdirSync(shots, { recursive: true });
+  const server = await startServer(binary, [
+    ...['--source', `sim:desk?seed=${seed}&motion=stand&fps=10`, '--mount', 'sim'],
+    ...['--data-dir', join(folder, 'shots-data')],
+    ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
+  ]);
+  const context = { shots, url: server.http };
+  try {
+    const transport = createGrpcWebTransport({ baseUrl: server.http });
+    context.client = (service) => createClient(service, transport);
+    context.expert = await Expert.open(chromium, `${server.http}/?name=Ann`);
+    await context.expert.waitForStatus(/^tracking/, 60_000);
+    await context.expert.page.locator('canvas.map[data-eye]').waitFor();
+    const points = await fill(context);
+    await thePage(context);
+    await theWearer(context);
+    globalThis.clearInterval(points);
+    console.log(`ok    pictures in ${shots}`);
+  } finally {
+    await context.expert?.close();
+    await server.stop();
+  }
+  return 0;
+}
+
+/** Another expert, who places marks, says something and goes on pointing. */
+async function fill({ client, expert, folder, shots }) {
+  const [session, annotations] = [client(SessionService), client(AnnotationService)];
+  const { sessionId } = await session.join({ displayName: 'Bea', role: Role.EXPERT });
+  const { id } = await expert.look();
+  const target = ([u, v]) => ({
+    target: { case: 'framePixel', value: { frameId: BigInt(id), pixel: { u, v } } },
+  });
+  for (const { at, to, ...draft } of MARKS) {
+    const picture =
+      draft.shape === AnnotationShape.PICTURE
+        ? new Uint8Array(readFileSync(samplePng(folder ?? shots)))
+        : undefined;
+    await annotations
+      .create({
+        ...{ requestId: globalThis.crypto.randomUUID(), sessionId },
+        draft: { ...draft, target: target(at), endTarget: to && target(to), picture },
+      })
+      .catch((error) => console.log(`      not placed: ${error.rawMessage}`));
+  }
+  const said = (text) =>
+    client(TalkService).say({ sessionId, requestId: globalThis.crypto.randomUUID(), text });
+  await said('The valve is the brass one, left of the pump.');
+  await said('Tell me when it is closed.');
+  const pointers = client(PointerService);
+  const strokeId = globalThis.crypto.randomUUID();
+  const newest = () => expert.page.locator('canvas.picture').getAttribute('data-frame-id');
+  const point = async () => {
+    const frameId = BigInt((await newest()) || 0);
+    const value = { frameId, pixel: { u: 400, v: 210 } };
+    const points = [{ target: { case: 'framePixel', value } }];
+    await pointers.point({ sessionId, strokeId, kind: PointerKind.LASER, points });
+  };
+  return globalThis.setInterval(() => void point().catch(() => undefined), 300);
+}
+
+async function eachSize({ expert, shots }, name, settle) {
+  const { page } = expert;
+  for (const scheme of ['dark', 'light']) {
+    await page.emulateMedia({ colorScheme: scheme });
+    for (const { width, height } of SIZES) {
+      await page.setViewportSize({ width, height });
+      await sleep(settle);
+      await page.screenshot({ path: join(shots, `${name}-${scheme}-${width}.png`) });
+    }
+  }
+}
+
+async function thePage(context) {
+  const { expert, shots } = context;
+  const { page } = expert;
+  await page.locator('aside li .pick').first().waitFor();
+  await eachSize(context, 'page', 1500);
+  await page.setViewportSize({ width: 1280, height: 720 });
+  await page.emulateMedia({ colorScheme: 'dark' });
+  await expert.enlarge('video');
+  await sleep(1500);
+  await page.screenshot({ path: join(shots, 'page-video.png') });
+}
+
+async function theWearer(context) {
+  const { expert, client, url, shots } = context;
+  const { page } = expert;
+  await page.goto(`${url}/wearer`);
+  await page.locator('canvas.picture[data-frame-id]').waitFor({ timeout: 30_000 });
+  await eachSize(context, 'wearer', 1200);
+  const { png } = await client(SessionService).getFrame({ view: VideoView.AUGMENTED });
+  writeFileSync(join(shots, 'augmented.png'), png);
+  await page.setViewportSize({ width: 1280, height: 720 });
+  await page.keyboard.press('p');
+  await sleep(1500);
+  await page.screenshot({ path: join(shots, 'wearer-paused.png') });
+}
