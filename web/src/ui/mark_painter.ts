@@ -50,8 +50,8 @@ export class MarkPainter extends Surface {
 
   private label(label: Label, colour: string, whole: boolean, taken?: Box[]): void {
     const { at, hollow } = label;
-    const pane = whole ? { width: this.right, height: this.canvas.height } : undefined;
-    const place = { x: this.x(at), y: this.y(at), ratio: this.ratio, pane };
+    const { ratio, bounds } = this;
+    const place = { x: this.x(at), y: this.y(at), ratio, pane: bounds, whole };
     drawLabel(this.context, label, place, { colour, hollow }, taken);
   }
 

@@ -269,32 +269,36 @@ async function frozen(context) {
   );
 }
 
+/** What the panel says the head does and who steers: not its buttons, whose words are always there. */
 async function head(context) {
   const { ann, check } = context;
   const { page } = ann;
   const panel = page.locator('section.gaze');
-  const mode = () => panel.getAttribute('data-mode');
+  const says = async () =>
+    `${await panel.getAttribute('data-mode')} | ${await panel.locator('.doing').innerText()} | ${await panel.locator('.steer').innerText()}`;
   const seen = [];
   const does = async (key, pattern) => {
+    const before = await says();
     await ann.press(key);
-    if (await until(async () => pattern.test(`${await mode()} ${await panel.innerText()}`), 8000))
-      seen.push(key);
+    const done = await until(async () => pattern.test(await says()), 12_000);
+    if (done && !pattern.test(before)) seen.push(key);
+    else console.log(`      ${key}: "${before}", then "${await says()}"`);
   };
   await tracked(context);
-  await does('q', /you steer|yours|release/i);
+  await does('q', /you pilot/);
   await ann.press('g');
   await tabTo(page, '.video');
-  await does('Enter', /fixat|hold|target/i);
+  await does('Enter', /turning to|holding|following|out of reach/);
   await ann.press('v');
-  await does('x', /stop/i);
-  await does('0', /home|ahead/i);
-  await does('l', /level/i);
-  await does('e', /explor/i);
-  await does('q', /pilot|take|nobody/i);
+  await does('x', /stopped/);
+  await does('0', /straight ahead|at rest/);
+  await does('e', /looking round/);
+  await does('l', /level/);
+  await does('q', /nobody pilots/);
   check(
     'the head is taken, turned, stopped and released by keys',
     seen.length === 7,
-    `${seen.join(' ')}; "${(await panel.innerText()).replaceAll('\n', ' | ').slice(0, 160)}"`,
+    `${seen.join(' ')}; "${(await says()).replaceAll('\n', ' ')}"`,
   );
 }
 

@@ -1,13 +1,14 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--only CHECK,CHECK]  (of tools)
-//        [--part page|gaze|dots|person|invite|layout|tools|wear|waiting|talk|oidc]   (gaze: the turning of the head; dots: measured features
-//        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
-//        from another address than loopback where this may make a network namespace; wear: a phone as the
-//        camera, and an expert, each in a network of its own; layout: sizes of
-//        window and barriers; tools: two people and what they draw, point at and change; waiting: who comes waits to be let in;
-//        talk: voices, messages, the pause of the picture, the first task; oidc: a firm's people sign in;
-//        page: everything else)
+//        [--only CHECK,CHECK]  (of tools)  [--count N]  (of clicks)
+//        [--part PART]
+// page: what is in no other part. gaze: the turning of the head. dots: measured features while the wearer turns.
+// person: typing, keys, tabs, a reload. invite: TLS, invites and what ends them, from another address than
+// loopback where this may make a network namespace. layout: sizes of window and barriers. tools: two people and
+// what they draw, point at and change. keys: everything without a mouse. shapes: marks by their pixels, page
+// against server. wear: a phone as the camera, and an expert, each in a network of its own. waiting: who comes
+// waits to be let in. talk: voices, messages, the pause of the picture, the first task. oidc: a firm's people sign
+// in. By hand alone: clicks (over a late network), shots (pictures at seven sizes, light and dark).
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';

@@ -71,9 +71,9 @@ export async function runShots({ server: binary, chromium, seed, shots, folder }
 }
 
 /** Another expert, who places marks, says something and goes on pointing. */
-async function fill({ client, expert, folder, shots }) {
+async function fill({ client, expert, shots }) {
   const [session, annotations] = [client(SessionService), client(AnnotationService)];
-  const { sessionId } = await session.join({ displayName: 'Bea', role: Role.EXPERT });
+  const { sessionId, colorRgba } = await session.join({ displayName: 'Bea', role: Role.EXPERT });
   const { id } = await expert.look();
   const target = ([u, v]) => ({
     target: { case: 'framePixel', value: { frameId: BigInt(id), pixel: { u, v } } },
@@ -81,12 +81,12 @@ async function fill({ client, expert, folder, shots }) {
   for (const { at, to, ...draft } of MARKS) {
     const picture =
       draft.shape === AnnotationShape.PICTURE
-        ? new Uint8Array(readFileSync(samplePng(folder ?? shots)))
+        ? new Uint8Array(readFileSync(samplePng(shots)))
         : undefined;
     await annotations
       .create({
         ...{ requestId: globalThis.crypto.randomUUID(), sessionId },
-        draft: { ...draft, target: target(at), endTarget: to && target(to), picture },
+        draft: { colorRgba, ...draft, target: target(at), endTarget: to && target(to), picture },
       })
       .catch((error) => console.log(`      not placed: ${error.rawMessage}`));
   }
