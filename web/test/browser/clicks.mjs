@@ -24,7 +24,7 @@ const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 export async function runClicks({ server: binary, chromium, seed, folder, count = COUNT }) {
   const truthFile = join(folder, 'clicks.jsonl');
   const server = await startServer(binary, [
-    ...['--source', `sim:desk?seed=${seed}`, '--sim-truth', truthFile],
+    ...['--source', `sim:desk?seed=${seed}&motion=sway&fps=15`, '--sim-truth', truthFile],
     ...['--data-dir', join(folder, 'clicks-data')],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);

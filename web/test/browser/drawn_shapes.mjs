@@ -44,7 +44,7 @@ const DRAFTS = {
   },
   measure: {
     ...{ shape: AnnotationShape.MEASURE, colorRgba: 0x00ffffff, at: [270, 150], to: [400, 185] },
-    more: { sizeM: 0.1 },
+    more: { sizeM: 0.4 }, // ticks large enough to hold the line along itself
   },
   pin: {
     ...{ shape: AnnotationShape.PIN, colorRgba: 0xff8000ff, at: [520, 230] },
@@ -59,7 +59,7 @@ const DRAFTS = {
     more: { sizeM: 0.12, text: 'service', checkItems: ['oil', 'lid'] },
   },
   ink: {
-    ...{ shape: AnnotationShape.INK, colorRgba: 0xff0080ff, at: [440, 330] },
+    ...{ shape: AnnotationShape.INK, colorRgba: 0xff0080ff, at: [420, 100] },
     more: {
       inkOffsetM: Array.from({ length: 30 }, (_, i) => ({
         ...{ x: 0.006 * i, y: 0.04 * Math.sin(i / 4), z: 0.002 * i },
@@ -148,6 +148,14 @@ async function trusted({ annotations, owner }, { shape, colorRgba, more }, featu
   return false;
 }
 
+/** Until the page has drawn the pinned picture, whose bytes come after its place. */
+async function ready(expert) {
+  for (const end = Date.now() + SETTLED_MS * 5; Date.now() < end; await sleep(300)) {
+    const image = decodePng((await expert.marks()).png);
+    if (QUARTERS.every((rgb) => pixelsOf(image, rgb, PICTURE_OFF).length > 50)) return;
+  }
+}
+
 /** The frozen frame as the page shows it and as the server draws it. */
 async function compare(context) {
   const { expert, session, annotations, check, shots } = context;
@@ -155,8 +163,8 @@ async function compare(context) {
   await expert.press('p');
   const still = expert.page.locator('canvas.still');
   await still.waitFor({ timeout: 10_000 });
-  await sleep(1500);
   const frameId = Number(await still.getAttribute('data-frame-id'));
+  await ready(expert);
   const [marks, augmented, { annotations: all }] = await Promise.all([
     expert.marks(),
     session.getFrame({ frameId: BigInt(frameId), view: VideoView.AUGMENTED }),

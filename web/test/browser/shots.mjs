@@ -70,23 +70,42 @@ export async function runShots({ server: binary, chromium, seed, shots, folder }
   return 0;
 }
 
+/** Until the camera has been placed for some seconds: marks on a young map are not trusted. */
+async function settled(expert) {
+  const { page } = expert;
+  await page.locator('canvas.picture[data-frame-id]:not([data-frame-id=""])').first().waitFor();
+  for (let steady = 0, i = 0; steady < 8 && i < 120; ++i) {
+    const text = await page.locator('header .status strong').innerText();
+    steady = text === 'tracking good' ? steady + 1 : 0;
+    await sleep(500);
+  }
+}
+
 /** Another expert, who places marks, says something and goes on pointing. */
 async function fill({ client, expert, shots }) {
   const [session, annotations] = [client(SessionService), client(AnnotationService)];
   const { sessionId, colorRgba } = await session.join({ displayName: 'Bea', role: Role.EXPERT });
-  const { id } = await expert.look();
-  const target = ([u, v]) => ({
-    target: { case: 'framePixel', value: { frameId: BigInt(id), pixel: { u, v } } },
+  await settled(expert);
+  const target = (frameId, [u, v]) => ({
+    target: { case: 'framePixel', value: { frameId, pixel: { u, v } } },
   });
   for (const { at, to, ...draft } of MARKS) {
     const picture =
       draft.shape === AnnotationShape.PICTURE
         ? new Uint8Array(readFileSync(samplePng(shots)))
         : undefined;
+    // Not the page's own: where it is drawn in software that may be some seconds old.
+    const { frameId } = await session.getFrame({});
     await annotations
       .create({
         ...{ requestId: globalThis.crypto.randomUUID(), sessionId },
-        draft: { colorRgba, ...draft, target: target(at), endTarget: to && target(to), picture },
+        draft: {
+          colorRgba,
+          ...draft,
+          target: target(frameId, at),
+          endTarget: to && target(frameId, to),
+          picture,
+        },
       })
       .catch((error) => console.log(`      not placed: ${error.rawMessage}`));
   }
@@ -96,23 +115,22 @@ async function fill({ client, expert, shots }) {
   await said('Tell me when it is closed.');
   const pointers = client(PointerService);
   const strokeId = globalThis.crypto.randomUUID();
-  const newest = () => expert.page.locator('canvas.picture').getAttribute('data-frame-id');
-  const point = async () => {
-    const frameId = BigInt((await newest()) || 0);
-    const value = { frameId, pixel: { u: 400, v: 210 } };
-    const points = [{ target: { case: 'framePixel', value } }];
-    await pointers.point({ sessionId, strokeId, kind: PointerKind.LASER, points });
-  };
+  const { annotations: all } = await annotations.list({});
+  const { x, y, z } = all.find(({ anchor }) => anchor?.pointInWorldM).anchor.pointInWorldM;
+  const value = { x: x + 0.25, y: y + 0.05, z };
+  const points = [{ target: { case: 'pointInWorldM', value } }];
+  const point = () => pointers.point({ sessionId, strokeId, kind: PointerKind.LASER, points });
   return globalThis.setInterval(() => void point().catch(() => undefined), 300);
 }
 
-async function eachSize({ expert, shots }, name, settle) {
+async function eachSize({ expert, shots }, name, settle, ready) {
   const { page } = expert;
   for (const scheme of ['dark', 'light']) {
     await page.emulateMedia({ colorScheme: scheme });
     for (const { width, height } of SIZES) {
       await page.setViewportSize({ width, height });
       await sleep(settle);
+      await ready();
       await page.screenshot({ path: join(shots, `${name}-${scheme}-${width}.png`) });
     }
   }
@@ -122,7 +140,8 @@ async function thePage(context) {
   const { expert, shots } = context;
   const { page } = expert;
   await page.locator('aside li .pick').first().waitFor();
-  await eachSize(context, 'page', 1500);
+  const tracking = () => expert.waitForStatus(/^tracking/, 15_000).catch(() => undefined);
+  await eachSize(context, 'page', 1500, tracking);
   await page.setViewportSize({ width: 1280, height: 720 });
   await page.emulateMedia({ colorScheme: 'dark' });
   await expert.enlarge('video');
@@ -135,7 +154,13 @@ async function theWearer(context) {
   const { page } = expert;
   await page.goto(`${url}/wearer`);
   await page.locator('canvas.picture[data-frame-id]').waitFor({ timeout: 30_000 });
-  await eachSize(context, 'wearer', 1200);
+  // Its line of words is gone where all is well.
+  const well = () =>
+    page
+      .locator('.line.hidden')
+      .waitFor({ state: 'attached', timeout: 15_000 })
+      .catch(() => undefined);
+  await eachSize(context, 'wearer', 1200, well);
   const { png } = await client(SessionService).getFrame({ view: VideoView.AUGMENTED });
   writeFileSync(join(shots, 'augmented.png'), png);
   await page.setViewportSize({ width: 1280, height: 720 });
