@@ -6,6 +6,7 @@ const MAX_LINE_PX = 300;
 const STEP_PX = 17;
 const INSET_PX = 6;
 const MOST_OF_PANE = 0.45;
+const MOST_OF_WIDTH = 0.6; // in an inset a longer label hides more than it says
 
 /** Where a label belongs [canvas px]: beside `x`, `y`, within `pane`; `whole`: all of it, wrapped. */
 export interface LabelPlace {
@@ -147,6 +148,7 @@ export function drawLabel(
   // Not where it would hide what it is about; the large pane and the list have the room.
   if (place.whole && lines.length * step > MOST_OF_PANE * pane.height) lines = [text];
   const width = Math.max(...lines.map(widthOf)) + 2 * inset;
+  if (!place.whole && width > MOST_OF_WIDTH * pane.width) return;
   const height = step * lines.length + 4 * ratio;
   const box = placeFor(place, { width, height }, taken);
   if (!box) return;

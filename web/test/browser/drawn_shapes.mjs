@@ -110,18 +110,21 @@ function quarters() {
   return new Uint8Array(pngjs.PNG.sync.write(image));
 }
 
-/** On features of the map near where they are wanted, as their place is known best; where one is not trusted, another. */
-async function place(context) {
-  const { session, map, expert } = context;
-  const { id } = await expert.look();
-  const view = viewOf(await session.getFrame({ frameId: BigInt(id) }));
+/** What sorts the features of the map by how near to a pixel they appear now. */
+export async function featuresNear({ session, map }) {
+  const view = viewOf(await session.getFrame({}));
   const features = (await map.get({})).map.upserted
     .filter(({ depthKnown }) => depthKnown)
     .map((feature) => ({ feature, pixel: pixelIn(view, vector(feature.pointInWorldM)) }))
     .filter(({ pixel }) => pixel);
+  return (at) =>
+    [...features].sort((a, b) => length(minus(a.pixel, at)) - length(minus(b.pixel, at)));
+}
+
+/** On features of the map near where they are wanted, as their place is known best; where one is not trusted, another. */
+async function place(context) {
+  const near = await featuresNear(context);
   for (const draft of Object.values(DRAFTS)) {
-    const near = (at) =>
-      [...features].sort((a, b) => length(minus(a.pixel, at)) - length(minus(b.pixel, at)));
     for (const { feature } of near(draft.at).slice(0, TRIES)) {
       const end = draft.to && near(draft.to)[0].feature;
       if (await trusted(context, draft, feature, end)) break;
@@ -160,6 +163,7 @@ async function ready(expert) {
 async function compare(context) {
   const { expert, session, annotations, check, shots } = context;
   await expert.waitForStatus(/^tracking/, 60_000);
+  await expert.page.locator('canvas.picture[data-frame-id]').waitFor();
   await expert.press('p');
   const still = expert.page.locator('canvas.still');
   await still.waitFor({ timeout: 10_000 });
@@ -306,8 +310,8 @@ function filled({ check }, all, view, { page, server, marks }) {
   };
   const worst = [];
   for (let i = 0; i < SAMPLES * SAMPLES; ++i) {
-    // Off the borders of the quarters, and of the picture.
-    const [s, t] = [i % SAMPLES, Math.floor(i / SAMPLES)].map((k) => (k + 0.5) / SAMPLES);
+    // Off the borders of the quarters, and the outline's halo.
+    const [s, t] = [i % SAMPLES, Math.floor(i / SAMPLES)].map((k) => (k + 1) / (SAMPLES + 1));
     const point = plus(plus(a, times(minus(b, a), s)), times(minus(d, a), 1 - t));
     const [u, v] = pixelIn(view, point);
     const onPage = [

@@ -5,10 +5,12 @@ import { join } from 'node:path';
 import { createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { AnnotationService, AnnotationShape } from '../../src/gen/saccade/v1/annotation_pb.js';
+import { MapService } from '../../src/gen/saccade/v1/map_pb.js';
 import { PointerKind, PointerService } from '../../src/gen/saccade/v1/pointer_pb.js';
-import { Role, SessionService } from '../../src/gen/saccade/v1/session_pb.js';
+import { Role, SessionService, Topic } from '../../src/gen/saccade/v1/session_pb.js';
 import { TalkService } from '../../src/gen/saccade/v1/talk_pb.js';
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
+import { featuresNear } from './drawn_shapes.mjs';
 import { Expert } from './expert.mjs';
 import { samplePng } from './files.mjs';
 import { SIZES } from './layout.mjs';
@@ -19,26 +21,25 @@ const STRAIGHT = { x: 0, y: Math.sin(0.35), z: 0, w: Math.cos(0.35) };
 
 /** In the picture's pixels (640 x 480). */
 const MARKS = [
-  { shape: AnnotationShape.CUBE, at: [250, 210] },
-  { shape: AnnotationShape.NOTE, at: [330, 330], text: 'oil: check the level first' },
-  { shape: AnnotationShape.ARROW, at: [470, 260], sizeM: 0.08 },
-  { shape: AnnotationShape.PIN, at: [130, 300], text: 'leaks', sizeM: 0.08 },
-  { shape: AnnotationShape.PIN, at: [180, 250], sizeM: 0.08 },
-  { shape: AnnotationShape.MEASURE, at: [240, 120], to: [390, 140] },
+  { shape: AnnotationShape.CUBE, at: [140, 80] },
+  { shape: AnnotationShape.NOTE, at: [345, 410], text: 'oil: check the level first' },
+  { shape: AnnotationShape.ARROW, at: [560, 190], sizeM: 0.08 },
+  { shape: AnnotationShape.PIN, at: [50, 300], text: 'leaks', sizeM: 0.08 },
+  { shape: AnnotationShape.PIN, at: [130, 290], sizeM: 0.08 },
+  { shape: AnnotationShape.MEASURE, at: [260, 200], to: [420, 205] },
   {
-    ...{ shape: AnnotationShape.BOX, at: [540, 330] },
+    ...{ shape: AnnotationShape.BOX, at: [290, 50] },
     ...{ extentM: { x: 0.14, y: 0.1, z: 0.08 }, worldFromMark: STRAIGHT },
   },
-  { shape: AnnotationShape.PICTURE, at: [110, 190], sizeM: 0.16, text: 'wiring' },
+  { shape: AnnotationShape.PICTURE, at: [160, 400], sizeM: 0.16, text: 'wiring' },
   {
-    ...{ shape: AnnotationShape.CHECK_LIST, at: [420, 400], text: 'Service', sizeM: 0.08 },
+    ...{ shape: AnnotationShape.CHECK_LIST, at: [530, 340], text: 'Service', sizeM: 0.08 },
     checkItems: ['close the valve', 'open the lid', 'change the filter'],
   },
   {
-    ...{ shape: AnnotationShape.INK, at: [300, 250] },
-    inkPx: Array.from({ length: 40 }, (_, i) => ({
-      u: 300 + 45 * Math.cos(i / 6.2),
-      v: 260 + 30 * Math.sin(i / 6.2),
+    ...{ shape: AnnotationShape.INK, at: [340, 270] },
+    inkOffsetM: Array.from({ length: 42 }, (_, i) => ({
+      ...{ x: 0.1 * Math.cos(i / 6.4), y: 0.07 * Math.sin(i / 6.4), z: 0 },
     })),
   },
 ];
@@ -81,31 +82,36 @@ async function settled(expert) {
   }
 }
 
+/** Somebody who is there: the wearer sees who watches. */
+async function watches(session, sessionId) {
+  for (let i = 0; i < 100; ++i) {
+    try {
+      const stream = session.subscribe({ sessionId, topics: [Topic.PRESENCE], window: 32 });
+      for await (const event of stream) if (!event) break;
+    } catch {
+      await sleep(1000); // nothing is acknowledged, so it ends now and then; in the end with the server
+    }
+  }
+}
+
 /** Another expert, who places marks, says something and goes on pointing. */
 async function fill({ client, expert, shots }) {
   const [session, annotations] = [client(SessionService), client(AnnotationService)];
   const { sessionId, colorRgba } = await session.join({ displayName: 'Bea', role: Role.EXPERT });
+  void watches(session, sessionId);
   await settled(expert);
-  const target = (frameId, [u, v]) => ({
-    target: { case: 'framePixel', value: { frameId, pixel: { u, v } } },
-  });
+  // Where the map is sure: on a blank wall it would not be trusted.
+  const near = await featuresNear({ session, map: client(MapService) });
+  const target = (at) => ({ target: { case: 'featureId', value: near(at)[0].feature.id } });
   for (const { at, to, ...draft } of MARKS) {
     const picture =
       draft.shape === AnnotationShape.PICTURE
         ? new Uint8Array(readFileSync(samplePng(shots)))
         : undefined;
-    // Not the page's own: where it is drawn in software that may be some seconds old.
-    const { frameId } = await session.getFrame({});
     await annotations
       .create({
         ...{ requestId: globalThis.crypto.randomUUID(), sessionId },
-        draft: {
-          colorRgba,
-          ...draft,
-          target: target(frameId, at),
-          endTarget: to && target(frameId, to),
-          picture,
-        },
+        draft: { colorRgba, ...draft, target: target(at), endTarget: to && target(to), picture },
       })
       .catch((error) => console.log(`      not placed: ${error.rawMessage}`));
   }
@@ -131,7 +137,10 @@ async function eachSize({ expert, shots }, name, settle, ready) {
       await page.setViewportSize({ width, height });
       await sleep(settle);
       await ready();
-      await page.screenshot({ path: join(shots, `${name}-${scheme}-${width}.png`) });
+      await page.screenshot({
+        path: join(shots, `${name}-${scheme}-${width}.png`),
+        timeout: 120_000,
+      });
     }
   }
 }

@@ -79,6 +79,7 @@ export async function byKeyboard(context) {
     'picture',
     await made(context, AnnotationShape.PICTURE, async () => {
       await opened(context, '#picture-file', () => ann.press('Enter'));
+      await page.waitForFunction(() => document.activeElement?.id === 'picture-file');
       const chooser = page.waitForEvent('filechooser');
       await ann.press('Enter');
       await (await chooser).setFiles(samplePng(context.folder));
