@@ -69,7 +69,8 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, Event
       [](const TrackedFrame& frame) { return PictureOf(*frame.frame); }, may_show, sink_);
   views_[static_cast<std::size_t>(VideoView::kAugmented)] = std::make_unique<ViewEncoder>(
       VideoView::kAugmented, options_.video_bit_rate_bit_s,
-      [this](const TrackedFrame& frame) { return DrawAugmented(frame); }, may_show, sink_);
+      [this](const TrackedFrame& frame) { return DrawAugmented(frame, /*waits=*/false); }, may_show,
+      sink_);
   pictures_->SetOnChange(
       [this](const std::shared_ptr<const PicturePause>& state) { OnPicturePause(state); });
 }

@@ -107,7 +107,8 @@ class Engine : public Backend {
   void Publish(bool new_frame);
   void MakeStill(StillRequest request);
   EngineStatistics Statistics() const;
-  cv::Mat DrawAugmented(const TrackedFrame& frame) const;
+  /// `waits`: for pinned pictures that are not decoded yet; else they come with a later frame.
+  cv::Mat DrawAugmented(const TrackedFrame& frame, bool waits) const;
 
   const EngineOptions options_;
   ServerFacts facts_;

@@ -39,8 +39,9 @@ void Engine::MakeStill(StillRequest request) {
   frame.tracked.stages.captured_ns = request.past.frame->received_time_ns;
   std::vector<uchar> png;
   try {
-    const cv::Mat picture =
-        request.view == VideoView::kAugmented ? DrawAugmented(frame) : PictureOf(*frame.frame);
+    const cv::Mat picture = request.view == VideoView::kAugmented
+                                ? DrawAugmented(frame, /*waits=*/true)
+                                : PictureOf(*frame.frame);
     // Level 1: a third of the time of the default for a tenth more bytes.
     cv::imencode(".png", picture, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
   } catch (const std::exception&) {  // no memory, or what OpenCV will not draw: said below
@@ -55,7 +56,7 @@ void Engine::MakeStill(StillRequest request) {
   request.done(Still{std::make_shared<const std::string>(png.begin(), png.end()), frame.tracked});
 }
 
-cv::Mat Engine::DrawAugmented(const TrackedFrame& frame) const {
+cv::Mat Engine::DrawAugmented(const TrackedFrame& frame, bool waits) const {
   OverlayOptions overlay = options_.overlay;
   const std::shared_ptr<const GazeSnapshot> state = gaze();
   if (state->target) {  // green
@@ -65,7 +66,9 @@ cv::Mat Engine::DrawAugmented(const TrackedFrame& frame) const {
       overlay.fixated_annotation = annotation->id;
     }
   }
-  overlay.picture = [this](const PicturePtr& one) { return gallery_.Find(one); };
+  overlay.picture = [this, waits](const PicturePtr& one) {
+    return waits ? gallery_.FindNow(one) : gallery_.Find(one);
+  };
   {
     const std::lock_guard lock(pointers_mutex_);
     overlay.pointers = pointers_;

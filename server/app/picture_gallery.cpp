@@ -35,6 +35,18 @@ cv::Mat PictureGallery::Find(const PicturePtr& picture) {
   return {};
 }
 
+cv::Mat PictureGallery::FindNow(const PicturePtr& picture) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::find_if(kept_.begin(), kept_.end(),
+                                    [&](const Kept& one) { return one.sha256 == picture->sha256; });
+    if (found != kept_.end() && found->decoded) return found->pixels;
+    if (found == kept_.end()) kept_.push_front({picture->sha256, {}, false});
+    if (kept_.size() > kKept) kept_.pop_back();
+  }
+  return Keep(*picture);
+}
+
 void PictureGallery::Step(Request request) {
   if (auto* read = std::get_if<ReadRequest>(&request)) {
     return read->done(ReadPictureFile(std::move(read->bytes)));
@@ -42,7 +54,7 @@ void PictureGallery::Step(Request request) {
   Keep(*std::get<PicturePtr>(request));
 }
 
-void PictureGallery::Keep(const Picture& picture) {
+cv::Mat PictureGallery::Keep(const Picture& picture) {
   const cv::Mat pixels = DecodePicture(picture, kDrawnSide);
   const std::lock_guard lock(mutex_);
   for (Kept& one : kept_) {
@@ -50,6 +62,7 @@ void PictureGallery::Keep(const Picture& picture) {
     one.pixels = pixels;
     one.decoded = true;
   }
+  return pixels;
 }
 
 }  // namespace saccade

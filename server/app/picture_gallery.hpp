@@ -28,6 +28,8 @@ class PictureGallery {
   void Read(std::string bytes, Done<PicturePtr> done);
   /// What to draw; empty: not decoded yet, which it asks for, or not to be decoded at all.
   cv::Mat Find(const PicturePtr& picture);
+  /// The same, decoded here where it is not yet: for what is drawn once, and whose thread may wait.
+  cv::Mat FindNow(const PicturePtr& picture);
 
  private:
   struct ReadRequest {
@@ -41,7 +43,7 @@ class PictureGallery {
     bool decoded = false;
   };
   void Step(Request request);
-  void Keep(const Picture& picture);
+  cv::Mat Keep(const Picture& picture);
 
   std::mutex mutex_;
   std::list<Kept> kept_;    // most recently used first

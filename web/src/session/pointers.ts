@@ -1,6 +1,7 @@
 import { type PointerEvent, PointerKind } from '../gen/saccade/v1/pointer_pb';
 import type { Vec3 } from '../geometry/vec3';
 import { toVec3 } from './convert';
+import { trace } from './trace';
 
 /** What somebody else points at or draws right now. */
 export interface OthersPointer {
@@ -18,8 +19,8 @@ const SILENT_MS = 1500;
 
 export class PointerBook {
   private readonly known = new Map<string, OthersPointer>();
-  /** Rises with every change. */
-  version = 0;
+  /** Told at once of what was heard. */
+  heard: () => void = () => undefined;
 
   /** `me`: the participant whose own are not kept, as they are drawn before they are sent. */
   apply({ pointers }: PointerEvent, me: string, nowMs: number): void {
@@ -27,7 +28,6 @@ export class PointerBook {
       if (pb.participantId === me) continue;
       const key = `${pb.participantId} ${pb.kind}`;
       const before = this.known.get(key);
-      ++this.version;
       if (pb.released) {
         if (before?.strokeId === pb.strokeId) this.known.delete(key);
         continue;
@@ -45,19 +45,18 @@ export class PointerBook {
         heardMs: nowMs,
       });
     }
+    trace('saccade.pointer.heard');
+    this.heard();
   }
 
   list(nowMs: number): OthersPointer[] {
     for (const [key, { heardMs }] of this.known) {
-      if (nowMs - heardMs < SILENT_MS) continue;
-      this.known.delete(key);
-      ++this.version;
+      if (nowMs - heardMs >= SILENT_MS) this.known.delete(key);
     }
     return [...this.known.values()];
   }
 
   clear(): void {
     this.known.clear();
-    ++this.version;
   }
 }

@@ -4,6 +4,7 @@ import { PointerKind } from '../gen/saccade/v1/pointer_pb';
 import { toTarget } from './targets';
 import type { Session } from './session';
 import type { Target } from './types';
+import { trace } from './trace';
 import { newUuid } from './uuid';
 
 const CALL_MS = 1000 / 60; // pointer.proto: at most 60 calls a second
@@ -73,6 +74,7 @@ export class Pointing {
     const released = this.ended && this.waiting.length === 0;
     this.sentMs = performance.now();
     ++this.inFlight;
+    trace('saccade.pointer.sent', { kind, released });
     try {
       await session.clients.pointers.point(
         {

@@ -27,6 +27,13 @@ export class Aim {
     return (pane === 'map' ? this.map : this.video).pixelAt(clientX, clientY);
   }
 
+  /** The same; beside the video's picture, the nearest of its pixels. */
+  pixelNear(pane: PaneName, clientX: number, clientY: number): Pixel {
+    return pane === 'map'
+      ? this.map.pixelAt(clientX, clientY)
+      : this.video.pixelNear(clientX, clientY);
+  }
+
   view(pane: PaneName): View | undefined {
     return (pane === 'map' ? this.map : this.video).view();
   }
@@ -38,10 +45,12 @@ export class Aim {
 
   /** Where the keyboard clicks, in pixels of the page: the middle of the map, the cursor in the video. */
   keyPlace(pane: PaneName): { x: number; y: number } {
-    const { element } = pane === 'map' ? this.map : this.video;
-    const box = element.getBoundingClientRect();
-    const { x, y } = (pane === 'video' && this.state.cursor) || { x: 0.5, y: 0.5 };
-    return { x: box.left + x * box.width, y: box.top + y * box.height };
+    if (pane === 'video') {
+      const { x, y } = this.state.cursor ?? { x: 0.5, y: 0.5 };
+      return this.video.placeAt(x, y);
+    }
+    const box = this.map.element.getBoundingClientRect();
+    return { x: box.left + box.width / 2, y: box.top + box.height / 2 };
   }
 
   /** `late`: it is asked for some time after the click. */

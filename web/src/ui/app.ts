@@ -134,6 +134,10 @@ export class App {
       dialogs.picture.dialog,
     );
     notes.listen();
+    session.pointers.heard = () => {
+      this.video.drawPointers();
+      this.map.drawPointers();
+    };
     handleMapPointer(this.map, controller.hand.gestures('map'));
     handleVideoPointer(this.video.element, controller.hand.gestures('video'));
     for (const pane of ['map', 'video'] as const) {

@@ -49,7 +49,7 @@ export class AppState {
   laser: { readonly pointInWorld: Vec3; readonly colorRgba: number } | undefined;
   /** A rectangle being drawn round marks, in that pane's pixels. */
   area: { readonly pane: PaneName; readonly from: Pixel; readonly to: Pixel } | undefined;
-  /** Where the keyboard clicks in the video, as shares of the pane; undefined: not used yet. */
+  /** Where the keyboard clicks in the video, as shares of the picture; undefined: not used yet. */
   cursor: { readonly x: number; readonly y: number } | undefined;
   byKeys = false; // it, and not the mouse, was moved last
   /** Marks that this person does not want to see drawn. */

@@ -22,7 +22,7 @@ export class AreaDrag implements Drag {
 
   move(x: number, y: number): void {
     const { aim, pane, state, from } = this;
-    this.to = aim.pixelAt(pane, x, y) ?? this.to;
+    this.to = aim.pixelNear(pane, x, y);
     state.area = { pane, from, to: this.to };
     state.moved();
   }
@@ -30,16 +30,18 @@ export class AreaDrag implements Drag {
   end(x: number, y: number): void {
     this.move(x, y);
     const { aim, pane, state, from, to } = this;
+    this.cancel();
     const view = aim.view(pane);
+    // No mark is drawn there, either.
+    if (!view) return state.refuse(pane, `Nothing selected: ${aim.whyNoLanding(pane)}`);
     const marks = (pane === 'map' ? aim.map : aim.video).marks();
     const found = marks.filter((mark) => {
-      const ends = view ? [mark.pointInWorld, labelPoint(mark)] : [];
-      const seen = ends.map((end) => view && projectPoint(view, end));
+      const ends = [mark.pointInWorld, labelPoint(mark)];
+      const seen = ends.map((end) => projectPoint(view, end));
       return mark.id !== '' && seen.some((at) => at && isWithin(at, from, to));
     });
     const ids = found.map(({ id }) => id);
     state.select(this.adds ? [...state.selection, ...ids] : ids);
-    this.cancel();
   }
 
   cancel(): void {

@@ -6,6 +6,8 @@ export interface Drag {
   end(x: number, y: number): void;
   /** Nothing has come of it. */
   cancel(): void;
+  /** True where a move is wanted at once, not with the screen's next frame. */
+  readonly prompt?: boolean;
   /** Once per screen frame: the picture may have moved under a pointer that has not. */
   tick?(): void;
 }

@@ -6,13 +6,15 @@ const MAX_LINE_PX = 300;
 const STEP_PX = 17;
 const INSET_PX = 6;
 const MOST_OF_PANE = 0.45;
+const MOST_OF_WIDTH = 0.6; // in an inset a longer label hides more than it says
 
-/** Where a label belongs [canvas px]; with `pane` all of it, wrapped and within that. */
+/** Where a label belongs [canvas px]: beside `x`, `y`, within `pane`; `whole`: all of it, wrapped. */
 export interface LabelPlace {
   readonly x: number;
   readonly y: number;
   readonly ratio: number; // canvas px per CSS px
-  readonly pane: { readonly width: number; readonly height: number } | undefined;
+  readonly pane: Box;
+  readonly whole: boolean;
 }
 
 /** On the canvas [px]. */
@@ -89,16 +91,46 @@ function spriteOf(
 }
 
 /**
- * A filled box with text, its lower left corner beside a point. Where it would lie over one of `taken`
- * it is left out, and otherwise joins them: of a crowd of marks some can be read, and each when chosen.
+ * Where a box of that size stands: above and to the right of its point, or where it would lie over one of
+ * `taken` there, in another of the four quarters; within `pane`. Undefined: in none of them.
+ */
+export function placeFor(
+  { x, y, ratio, pane }: Omit<LabelPlace, 'whole'>,
+  { width, height }: { readonly width: number; readonly height: number },
+  taken: readonly Box[],
+): Box | undefined {
+  const beside = INSET_PX * ratio;
+  const above = 4 * ratio;
+  for (const [right, up] of [
+    [true, true],
+    [false, true],
+    [true, false],
+    [false, false],
+  ]) {
+    const left = right ? x + beside : x - beside - width;
+    const top = up ? y - above - height : y + above;
+    const box = {
+      x: Math.max(pane.x, Math.min(left, pane.x + pane.width - width)),
+      y: Math.max(pane.y, Math.min(top, pane.y + pane.height - height)),
+      ...{ width, height },
+    };
+    if (!taken.some((other) => overlap(box, other))) return box;
+  }
+  return undefined;
+}
+
+/**
+ * A filled box with text beside a point. Where it would lie over one of `taken` wherever it stood it is left
+ * out, and otherwise joins them: of a crowd of marks some can be read, and each when chosen.
  */
 export function drawLabel(
   context: CanvasRenderingContext2D,
   { text, whole }: { readonly text: string; readonly whole: string },
-  { x: atX, y: atY, ratio, pane }: LabelPlace,
+  place: LabelPlace,
   look: { readonly colour: string; readonly hollow: boolean },
-  taken?: Box[],
+  taken: Box[] = [],
 ): void {
+  const { ratio, pane } = place;
   const widthOf = (line: string): number =>
     remember(widths, `${ratio} ${line}`, () => {
       context.font = fontAt(ratio);
@@ -106,7 +138,7 @@ export function drawLabel(
     });
   const inset = INSET_PX * ratio;
   const step = STEP_PX * ratio;
-  const most = pane && Math.min(MAX_LINE_PX * ratio, pane.width - 4 * inset);
+  const most = place.whole ? Math.min(MAX_LINE_PX * ratio, pane.width - 4 * inset) : undefined;
   let lines = [text];
   if (most !== undefined) {
     lines = remember(laidOut, `${ratio} ${most.toFixed(0)} ${whole}`, () =>
@@ -114,19 +146,14 @@ export function drawLabel(
     );
   }
   // Not where it would hide what it is about; the large pane and the list have the room.
-  if (pane && lines.length * step > MOST_OF_PANE * pane.height) lines = [text];
+  if (place.whole && lines.length * step > MOST_OF_PANE * pane.height) lines = [text];
   const width = Math.max(...lines.map(widthOf)) + 2 * inset;
+  if (!place.whole && width > MOST_OF_WIDTH * pane.width) return;
   const height = step * lines.length + 4 * ratio;
-  let x = atX + inset;
-  let y = atY - height - 4 * ratio;
-  if (pane) {
-    x = Math.max(0, Math.min(x, pane.width - width));
-    y = Math.max(0, Math.min(y, pane.height - height));
-  }
-  const box = { x, y, width, height };
-  if (taken?.some((other) => overlap(box, other))) return;
-  taken?.push(box);
+  const box = placeFor(place, { width, height }, taken);
+  if (!box) return;
+  taken.push(box);
   const edge = Math.ceil(ratio);
   const { canvas } = spriteOf(lines, width, ratio, look);
-  context.drawImage(canvas, Math.round(x) - edge, Math.round(y) - edge);
+  context.drawImage(canvas, Math.round(box.x) - edge, Math.round(box.y) - edge);
 }

@@ -35,6 +35,10 @@ export class Grips {
   /** Undefined: a click, or a turn of the map. */
   grab(pane: PaneName, press: Press): Drag | undefined {
     const { state, aim } = this;
+    if (state.tool === 'area') {
+      const corner = aim.pixelNear(pane, press.x, press.y); // a corner beside the picture is one
+      return new AreaDrag(state, aim, pane, corner, press.shift);
+    }
     const pixel = aim.pixelAt(pane, press.x, press.y);
     if (!pixel) return undefined;
     switch (state.tool) {
@@ -44,8 +48,6 @@ export class Grips {
         return this.may(pane) ? this.ink(pane, pixel, press) : undefined;
       case 'box':
         return this.may(pane) ? this.box(pane, pixel) : undefined;
-      case 'area':
-        return new AreaDrag(state, aim, pane, pixel, press.shift);
       case 'select':
         return this.take(pane, pixel, press);
       default:

@@ -132,7 +132,7 @@ export class Hand {
     return picked !== undefined && this.state.selection.has(picked.id);
   }
 
-  /** The keyboard's place in the video goes so far, as shares of the pane. */
+  /** The keyboard's place in the video goes so far, as shares of the picture. */
   moveCursor(dx: number, dy: number): void {
     const { x, y } = this.state.cursor ?? { x: 0.5, y: 0.5 };
     const within = (value: number): number => Math.min(Math.max(value, 0.01), 0.99);

@@ -75,7 +75,7 @@ export function handleKeys(
   });
 }
 
-const STEP = 0.01; // of the pane
+const STEP = 0.01; // of the picture
 const LONG_STEP = 0.06;
 
 /** The keyboard's place in the video. */

@@ -8,6 +8,7 @@ import type { Drag } from './drag';
 /** Shows the others where one points, for as long as it is pressed. */
 export class LaserDrag implements Drag {
   readonly clicks = false;
+  readonly prompt = true;
   private readonly pointing: Pointing;
   private at: { x: number; y: number };
   private sent = '';

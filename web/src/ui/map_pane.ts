@@ -3,7 +3,6 @@ import type { Pixel } from '../geometry/vec3';
 import { projectPoint, type View } from '../geometry/view';
 import { lineOfSight } from '../scene/gaze_sight';
 import type { MapView, ShownFrame } from '../scene/map_view';
-import { pageNowMs } from '../session/clock';
 import { toIntrinsics } from '../session/convert';
 import { gazeKey } from '../session/gaze';
 import type { Session } from '../session/session';
@@ -13,6 +12,7 @@ import { h } from './dom';
 import { Pane } from './pane';
 import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
+import type { PictureRect } from './pointer_layer';
 
 /** The 3D map: three.js below, the same marks as on the video above it. */
 export class MapPane extends Pane {
@@ -83,10 +83,10 @@ export class MapPane extends Pane {
     map.resize(width, height);
     map.pictureIntervalMs = screenFps > 0 && screenFps < 45 ? 150 : 0;
     const moved = map.draw(nowMs, this.eye());
+    this.drawPointers();
     const { version } = this.session.annotations;
     const gaze = gazeKey(this.session.gaze);
-    this.session.pointers.list(pageNowMs()); // forgets those that are silent
-    const key = `${version} ${gaze} ${this.state.drawn} ${this.session.pointers.version}`;
+    const key = `${version} ${gaze} ${this.state.drawn}`;
     if (!moved && key === this.drawnKey) return;
     this.drawnKey = key;
     const begin = performance.now();
@@ -111,6 +111,10 @@ export class MapPane extends Pane {
     if (!camera || !isPlaced(pose)) return undefined;
     const { frameId, worldFromCamera } = pose;
     return { frameId, camera, worldFromCamera, picture: facts !== undefined };
+  }
+
+  protected layout(): PictureRect {
+    return { left: 0, top: 0, scale: 1, ...this.size };
   }
 
   private drawOver(view: View, width: number, height: number): void {

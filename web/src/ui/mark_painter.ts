@@ -3,21 +3,12 @@ import type { EdgeArrow } from '../scene/edge_arrows';
 import type { Label, Marks, Stroke } from '../scene/strokes';
 import { type Box, drawLabel } from './draw_label';
 import { paintGrid } from './picture_grid';
-import { ACCENT, HALO, LINE, Surface } from './surface';
+import { ACCENT, HALO, Surface } from './surface';
 
 /** A picture where it appears: rows of points from its upper left corner. */
 export interface ShownPicture {
   readonly grid: readonly (readonly (Pixel | undefined)[])[];
   readonly image: ImageBitmap;
-}
-
-/** What somebody points at or draws, as it appears. */
-export interface ShownPointer {
-  readonly kind: 'laser' | 'sketch';
-  readonly pieces: readonly (readonly Pixel[])[];
-  readonly at: Pixel;
-  readonly colour: string; // CSS
-  readonly name: string; // empty: one's own
 }
 
 /** Marks, and what people do with them. */
@@ -59,8 +50,8 @@ export class MarkPainter extends Surface {
 
   private label(label: Label, colour: string, whole: boolean, taken?: Box[]): void {
     const { at, hollow } = label;
-    const pane = whole ? { width: this.right, height: this.canvas.height } : undefined;
-    const place = { x: this.x(at), y: this.y(at), ratio: this.ratio, pane };
+    const { ratio, bounds } = this;
+    const place = { x: this.x(at), y: this.y(at), ratio, pane: bounds, whole };
     drawLabel(this.context, label, place, { colour, hollow }, taken);
   }
 
@@ -88,31 +79,6 @@ export class MarkPainter extends Surface {
       if (!hollow) this.context.fill();
       this.stroke(chosen ? ACCENT : colour, 2);
     }
-  }
-
-  pointers(pointers: readonly ShownPointer[]): void {
-    for (const { kind, pieces, at, colour, name } of pointers) {
-      if (kind === 'laser') this.laser(at, colour);
-      for (const piece of pieces) {
-        this.trace(piece);
-        this.stroke(HALO, 5);
-        this.stroke(colour, 2);
-      }
-      if (name) this.words(name, this.x(at) + 12 * this.ratio, this.y(at), colour);
-    }
-  }
-
-  private laser(at: Pixel, colour: string): void {
-    const disc = (radius: number, style: string): void => {
-      this.context.beginPath();
-      const r = radius * this.ratio * Math.max(this.thinning, 1);
-      this.context.arc(this.x(at), this.y(at), r, 0, 2 * Math.PI);
-      this.context.fillStyle = style;
-      this.context.fill();
-    };
-    disc(7, HALO);
-    disc(5, colour);
-    disc(1.8, LINE);
   }
 
   /** What turns the selected mark: a ring with an arc round it. */

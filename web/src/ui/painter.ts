@@ -70,7 +70,7 @@ export class Painter extends MarkPainter {
     const right = x + r * 1.7;
     context.font = FONT.replace('13', String(12 * ratio));
     // Near the edge: on the other side.
-    const left = right + context.measureText(words).width > this.right;
+    const left = right + context.measureText(words).width > this.bounds.x + this.bounds.width;
     if (left) context.textAlign = 'right';
     this.words(words, left ? x - r * 1.7 : right, y + r * 1.3, TARGET_CSS);
     context.textAlign = 'left';

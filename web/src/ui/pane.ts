@@ -9,11 +9,12 @@ import { landingWords, ringRadius } from '../tools/landing';
 import type { AppState, Hover, PaneName } from './app_state';
 import { h, setText } from './dom';
 import { targetLabel } from './gaze_words';
-import type { ShownPicture, ShownPointer } from './mark_painter';
+import type { ShownPicture } from './mark_painter';
 import { allMarks } from './marks';
 import { Painter } from './painter';
 import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
+import { type PictureRect, PointerLayer, type ShownPointer } from './pointer_layer';
 import { dated } from './words';
 
 const SMALL_PICTURE_PX = 90; // below, a picture is flat enough for one cell
@@ -27,6 +28,7 @@ export abstract class Pane {
   /** How long drawing over the picture took [ms], of the last frames. */
   readonly overlayMs: number[] = [];
   protected readonly painter = new Painter();
+  private readonly pointers = new PointerLayer();
   private readonly note = h('p', { class: 'pane-note', role: 'status' });
   private cached: { readonly key: string; readonly marks: readonly Mark[] } | undefined;
 
@@ -44,6 +46,7 @@ export abstract class Pane {
       { class: `pane ${words.className}`, 'aria-label': words.label, tabindex: '0' },
       ...canvases,
       this.painter.canvas,
+      this.pointers.canvas,
       h('h2', { class: 'pane-title' }, words.title),
       this.note,
     );
@@ -56,6 +59,15 @@ export abstract class Pane {
   }
 
   abstract view(): View | undefined;
+
+  /** Where the view lies in the pane. */
+  protected abstract layout(): PictureRect;
+
+  /** What people point at and draw now: with each screen frame, and the moment something is heard. */
+  drawPointers(): void {
+    const view = this.view();
+    this.pointers.draw(view ? this.shownPointers(view) : [], this.size, this.layout());
+  }
 
   /** CSS pixels of the pane. */
   get shape(): { readonly width: number; readonly height: number } {
@@ -92,7 +104,6 @@ export abstract class Pane {
     if (handle) painter.handle(handle);
     const { area } = this.state;
     if (area?.pane === this.name) painter.area(area.from, area.to);
-    painter.pointers(this.shownPointers(view));
     return marks;
   }
 
@@ -107,7 +118,7 @@ export abstract class Pane {
   protected shownPictures(view: View, marks: readonly Mark[]): ShownPicture[] {
     const shown: ShownPicture[] = [];
     for (const mark of marks) {
-      if (mark.shape !== 'picture') continue;
+      if (mark.shape !== 'picture' || mark.hollow) continue; // not trusted: its outline alone
       const annotation = this.session.annotations.get(mark.id);
       const image = annotation && this.pictures.get(annotation);
       if (!image) continue;
@@ -131,11 +142,6 @@ export abstract class Pane {
     const { laser } = this.state;
     const at = laser && projectPoint(view, laser.pointInWorld);
     if (at) shown.push({ kind: 'laser', pieces: [], at, colour: colourOf(laser), name: '' });
-    const { dataset } = this.painter.canvas; // for tests: whose, and where
-    const words = shown
-      .filter(({ name }) => name !== '')
-      .map((each) => `${each.name} ${each.kind} ${each.at.u.toFixed(1)} ${each.at.v.toFixed(1)}`);
-    if (dataset['pointers'] !== words.join()) dataset['pointers'] = words.join();
     return shown;
   }
 

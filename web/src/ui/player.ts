@@ -5,6 +5,7 @@ import { RateMeter } from '../session/latency';
 import type { PictureSink } from '../session/picture_sink';
 import type { Session } from '../session/session';
 import type { FrameFacts } from '../session/types';
+import { Darkness } from './darkness';
 
 export interface Shown {
   readonly facts: FrameFacts;
@@ -16,6 +17,7 @@ export interface Shown {
 export class Player implements PictureSink {
   readonly canvas = document.createElement('canvas');
   readonly rate = new RateMeter();
+  readonly darkness = new Darkness();
   /** The frame on the canvas. */
   shown: Shown | undefined;
   private readonly decoder: Decoder;
@@ -75,8 +77,9 @@ export class Player implements PictureSink {
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
     context.drawImage(next.frame, 0, 0, width, height);
-    next.frame.close();
     const drawnMs = pageNowMs();
+    this.darkness.look(next.frame, drawnMs);
+    next.frame.close();
     this.shown = { facts, decodedMs: next.decodedMs, drawnMs };
     this.canvas.dataset['frameId'] = String(facts.frameId);
     this.rate.add(drawnMs);

@@ -34,6 +34,10 @@ class Held {
     this.start = { x: event.clientX, y: event.clientY };
   }
 
+  get prompt(): boolean {
+    return this.drag.prompt === true;
+  }
+
   move({ clientX: x, clientY: y }: PointerEvent): void {
     this.travelled = Math.max(this.travelled, Math.hypot(x - this.start.x, y - this.start.y));
     if (!this.drag.clicks || this.travelled >= CLICK_PX) this.drag.move(x, y);
@@ -95,6 +99,11 @@ function handleDrags(
   });
   element.addEventListener('pointermove', (event) => {
     if (held && mine(event) && gestures.holding()) held.move(event);
+  });
+  // Of a slow page frames are far apart; browsers without this event have the frame's.
+  element.addEventListener('pointerrawupdate', (event) => {
+    if (!(event instanceof PointerEvent) || !held?.prompt) return;
+    if (mine(event) && gestures.holding()) held.move(event);
   });
   element.addEventListener('pointerup', release);
   element.addEventListener('pointercancel', release);

@@ -13,7 +13,7 @@ export class Surface {
   private left = 0;
   private top = 0;
   protected ratio = 1;
-  protected right = 0; // edge of what is drawn on [canvas px]
+  protected bounds = { x: 0, y: 0, width: 0, height: 0 }; // of what is drawn on [canvas px]
 
   /** `ratio`: canvas pixels per CSS pixel; by default the screen's. */
   constructor(private readonly fixedRatio?: number) {
@@ -33,7 +33,7 @@ export class Surface {
     const height = Math.round(pane.height * this.ratio);
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
-    this.right = width;
+    this.bounds = { x: 0, y: 0, width, height };
     this.context.clearRect(0, 0, width, height);
     this.scale = rect.scale * this.ratio;
     this.left = rect.left * this.ratio;
@@ -44,10 +44,11 @@ export class Surface {
 
   /** Restricts drawing to the picture; `end` lifts it. */
   clip(width: number, height: number): void {
-    this.right = this.left + width * this.scale;
+    const { left: x, top: y, scale } = this;
+    this.bounds = { x, y, width: width * scale, height: height * scale };
     this.context.save();
     this.context.beginPath();
-    this.context.rect(this.left, this.top, width * this.scale, height * this.scale);
+    this.context.rect(x, y, width * scale, height * scale);
     this.context.clip();
   }
 

@@ -54,7 +54,7 @@ export class ToolsColumn {
 
   private makeConfirm(): HTMLElement {
     const yes = h('button', { type: 'button', class: 'danger' }, 'Reset');
-    const no = h('button', { type: 'button' }, 'Keep');
+    const no = h('button', { type: 'button' }, 'Keep (Esc)');
     yes.addEventListener('click', () => this.actions.confirmReset(true));
     no.addEventListener('click', () => this.actions.confirmReset(false));
     return h(

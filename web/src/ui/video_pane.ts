@@ -6,11 +6,11 @@ import type { Session } from '../session/session';
 import { pageNowMs } from '../session/clock';
 import { type FeatureState, type FrameFacts, isPlaced } from '../session/types';
 import type { AppState } from './app_state';
-import { Darkness } from './darkness';
 import { arrowLabel } from './gaze_words';
 import { Pane } from './pane';
 import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
+import type { PictureRect } from './pointer_layer';
 import { save, takeSnapshot } from './snapshot';
 import { Still } from './still';
 import { crowdedWords, lostWords, pauseWords } from './words';
@@ -20,7 +20,6 @@ const STALE_MS = 1000;
 /** The live picture, or a frozen one, with the marks that belong to exactly that frame. */
 export class VideoPane extends Pane {
   private still: Still | undefined;
-  private readonly darkness = new Darkness();
 
   constructor(session: Session, player: Player, state: AppState, pictures: PictureCache) {
     const words = { className: 'video', label: 'Live video', title: 'Video' };
@@ -83,12 +82,40 @@ export class VideoPane extends Pane {
 
   /** Picture pixel under a pointer; undefined outside the picture. */
   pixelAt(clientX: number, clientY: number): Pixel | undefined {
+    const pixel = this.toPixel(clientX, clientY);
+    const { u, v } = this.within(pixel);
+    return u === pixel.u && v === pixel.v ? pixel : undefined;
+  }
+
+  /** The same; outside, the nearest pixel of the picture. */
+  pixelNear(clientX: number, clientY: number): Pixel {
+    return this.within(this.toPixel(clientX, clientY));
+  }
+
+  private toPixel(clientX: number, clientY: number): Pixel {
+    const box = this.element.getBoundingClientRect();
+    const { left, top, scale } = this.layout();
+    return {
+      u: (clientX - box.left - left) / scale - 0.5,
+      v: (clientY - box.top - top) / scale - 0.5,
+    };
+  }
+
+  private within({ u, v }: Pixel): Pixel {
+    const { width, height } = this.layout();
+    const clamp = (value: number, size: number): number =>
+      Math.min(Math.max(value, -0.5), size - 0.5);
+    return { u: clamp(u, width), v: clamp(v, height) };
+  }
+
+  /** A place in the picture, as shares of it, in pixels of the page. */
+  placeAt(across: number, down: number): { x: number; y: number } {
     const box = this.element.getBoundingClientRect();
     const { left, top, scale, width, height } = this.layout();
-    const u = (clientX - box.left - left) / scale - 0.5;
-    const v = (clientY - box.top - top) / scale - 0.5;
-    const inside = u >= -0.5 && v >= -0.5 && u <= width - 0.5 && v <= height - 0.5;
-    return inside ? { u, v } : undefined;
+    return {
+      x: box.left + left + across * width * scale,
+      y: box.top + top + down * height * scale,
+    };
   }
 
   /** CSS pixels of a distance in the picture's. */
@@ -96,7 +123,7 @@ export class VideoPane extends Pane {
     return this.layout().scale;
   }
 
-  private layout(): { left: number; top: number; scale: number; width: number; height: number } {
+  protected layout(): PictureRect {
     const { width: paneWidth, height: paneHeight } = this.size;
     const width = Math.max(this.player.canvas.width, 1);
     const height = Math.max(this.player.canvas.height, 1);
@@ -121,6 +148,7 @@ export class VideoPane extends Pane {
     if (current?.view) this.drawFrame(current.facts, current.view);
     this.painter.end();
     this.took(performance.now() - begin);
+    this.drawPointers();
     this.painter.canvas.dataset['frameId'] = current ? String(current.facts.frameId) : '';
     this.updateNote();
   }
@@ -207,8 +235,7 @@ export class VideoPane extends Pane {
     else if (player.shown && stale) text = `picture is ${(age / 1000).toFixed(0)} s old`;
     else if (!player.shown && session.live) text = 'waiting for the first picture';
     else if (player.shown) {
-      this.darkness.look(player.canvas, nowMs);
-      if (this.darkness.black) text = 'The picture is black: uncover the lens, or make light';
+      if (player.darkness.black) text = 'The picture is black: uncover the lens, or make light';
       else if (session.live) text = lostWords(session.pose);
     }
     this.setNote(text);

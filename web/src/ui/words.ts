@@ -125,7 +125,8 @@ function trackingWords(pose: Pose | undefined): StatusWords {
 export function lostWords(pose: Pose | undefined): string {
   if (pose?.status !== 'lost' && pose?.status !== 'relocalising') return '';
   const { text, advice } = trackingWords(pose);
-  return `${text === 'lost' ? 'Lost' : 'Searching its place'}: ${advice}. Marks come back with it`;
+  const words = advice.replace(/\.$/, '');
+  return `${text === 'lost' ? 'Lost' : 'Searching its place'}: ${words}. Marks come back with it`;
 }
 
 /** "Ann paused the picture at 12:03; the map stays live". */

@@ -201,12 +201,12 @@ async function placeMany(context, pane, aim) {
 }
 
 /** Objects with their truth in a frame, least used first. */
-const candidates = (frame, used) =>
+export const candidates = (frame, used) =>
   frame.objects
     .filter(({ visible, pixel }) => visible && pixel)
     .sort((a, b) => (used.get(a.name) ?? 0) - (used.get(b.name) ?? 0));
 
-async function aimInVideo({ expert, truth, camera }, used) {
+export async function aimInVideo({ expert, truth, camera }, used) {
   const { id, left, top, scale, width, height } = await expert.look();
   const frame = truth.frame(id);
   if (!frame) return undefined;
@@ -262,7 +262,7 @@ export async function aimInMap(context, used) {
   await expert.click(near.at);
   const point = near.point;
   const depth = inCamera(frame.world_from_camera, point)[2];
-  return { name: near.name, where: () => Promise.resolve({ point, depth }) };
+  return { name: near.name, at: near.at, where: () => Promise.resolve({ point, depth }) };
 }
 
 /** Where the first of these objects that can be clicked lies on the page. */

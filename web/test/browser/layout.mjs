@@ -5,7 +5,7 @@ import { barriers } from './axe.mjs';
 import { Expert } from './expert.mjs';
 import { startServer } from './server.mjs';
 
-const SIZES = [
+export const SIZES = [
   { name: 'phone', width: 360, height: 640, touch: true },
   { name: 'phone-on-its-side', width: 844, height: 390, touch: true },
   { name: 'zoomed-200', width: 640, height: 360, touch: false },

@@ -1,12 +1,14 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--part page|gaze|dots|person|invite|layout|tools|wear|waiting|talk|oidc]   (gaze: the turning of the head; dots: measured features
-//        while the wearer turns; person: typing, keys, tabs, a reload; invite: TLS, invites and what ends them,
-//        from another address than loopback where this may make a network namespace; wear: a phone as the
-//        camera, and an expert, each in a network of its own; layout: sizes of
-//        window and barriers; tools: two people and what they draw, point at and change; waiting: who comes waits to be let in;
-//        talk: voices, messages, the pause of the picture, the first task; oidc: a firm's people sign in;
-//        page: everything else)
+//        [--only CHECK,CHECK]  (of tools)  [--count N]  (of clicks)
+//        [--part PART]
+// page: what is in no other part. gaze: the turning of the head. dots: measured features while the wearer turns.
+// person: typing, keys, tabs, a reload. invite: TLS, invites and what ends them, from another address than
+// loopback where this may make a network namespace. layout: sizes of window and barriers. tools: two people and
+// what they draw, point at and change. keys: everything without a mouse. shapes: marks by their pixels, page
+// against server. wear: a phone as the camera, and an expert, each in a network of its own. waiting: who comes
+// waits to be let in. talk: voices, messages, the pause of the picture, the first task. oidc: a firm's people sign
+// in. By hand alone: clicks (over a late network), shots (pictures at seven sizes, light and dark).
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -23,6 +25,8 @@ const { values: options } = parseArgs({
     seed: { type: 'string', default: '1' },
     shots: { type: 'string' },
     part: { type: 'string', default: 'page' },
+    only: { type: 'string' },
+    count: { type: 'string' },
   },
 });
 
@@ -50,6 +54,10 @@ const PARTS = {
   wear: async () => (await import('./wear.mjs')).runWear,
   waiting: async () => (await import('./waiting.mjs')).runWaiting,
   talk: async () => (await import('./talk.mjs')).runTalk,
+  clicks: async () => (await import('./clicks.mjs')).runClicks,
+  shapes: async () => (await import('./drawn_shapes.mjs')).runShapes,
+  keys: async () => (await import('./keyboard.mjs')).runKeyboard,
+  shots: async () => (await import('./shots.mjs')).runShots,
   oidc: async () => (await import('./oidc.mjs')).runOidc,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);

@@ -20,13 +20,14 @@ const OPEN = { viewport: { width: 1000, height: 640 }, prefix: ['nice', '-n', '5
 
 export const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-export async function runTools({ server: binary, chromium, seed, shots, folder }) {
+export async function runTools({ server: binary, chromium, seed, shots, folder, only }) {
   const server = await startServer(binary, [
     ...['--source', `sim:desk?seed=${seed}&motion=stand&fps=10`],
     ...['--data-dir', join(folder, 'tools-data')],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);
   const context = { failures: 0, shots, url: server.http, folder, chromium };
+  context.wants = (name) => !only || only.split(',').includes(name);
   context.check = (name, ok, figures) => {
     console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
     if (!ok) ++context.failures;
@@ -43,11 +44,11 @@ export async function runTools({ server: binary, chromium, seed, shots, folder }
     await context.ann.page.locator('canvas.map[data-eye]').waitFor();
     await nameIsAskedOnce(context);
     await context.ann.enlarge('video');
-    await byMouse(context);
-    await byKeyboard(context);
+    if (context.wants('mouse')) await byMouse(context);
+    if (context.wants('keys')) await byKeyboard(context);
     await togetherChecks(context);
-    await benchmark(context);
-    await sizes(context);
+    if (context.wants('crowd')) await benchmark(context);
+    if (context.wants('sizes')) await sizes(context);
     for (const name of ['ann', 'bo']) {
       const { errors } = context[name];
       context.check(`page errors, ${name}`, errors.length === 0, errors.join('; ') || 'none');
@@ -153,6 +154,7 @@ async function nameIsAskedOnce(context) {
   await page.locator('.app[data-first-picture-ms]').waitFor();
   await tracked(context);
   const again = await page.locator('dialog[open]').count();
+  await person.waitFor({ state: 'attached', timeout: 10_000 }); // he was gone for the reload
   const key = await page.evaluate(() => window.localStorage.getItem('saccade.person'));
   const colours = await context.ann.page
     .locator('.participant .person')
@@ -270,9 +272,16 @@ export async function byMouse(context) {
   await moved(context, turned ?? arrow);
 }
 
+/** The frame that the video shows: the frozen one, where it is. */
+const shownId = async (expert) => {
+  const still = expert.page.locator('canvas.still');
+  if ((await still.count()) > 0) return Number(await still.getAttribute('data-frame-id'));
+  return (await expert.look()).id;
+};
+
 /** Where the page draws the handle of the selected arrow: the end of its first line. */
 async function handleAt({ ann, session }, arrow) {
-  const { id } = await ann.look();
+  const id = await shownId(ann);
   const at = await pixelOf(session, id, arrow.anchor.pointInWorldM, { y: -2 * arrow.sizeM });
   const { left, top, scale } = await ann.look();
   return [left + (at[0] + 0.5) * scale, top + (at[1] + 0.5) * scale];
@@ -288,7 +297,7 @@ export async function pixelOf(session, frameId, point, { x = 0, y = 0, z = 0 } =
 
 /** Where the anchor of a mark appears on the page now. */
 export async function onPage({ session }, expert, annotation) {
-  const { id } = await expert.look();
+  const id = await shownId(expert);
   const [u, v] = await pixelOf(session, id, annotation.anchor.pointInWorldM);
   const { left, top, scale } = await expert.look();
   return [left + (u + 0.5) * scale, top + (v + 0.5) * scale];
@@ -304,6 +313,11 @@ async function moved(context, mark) {
   };
   await ann.press('v');
   await selectRow(ann, mark.id);
+  // In a picture that stands still: in a live one that is drawn seldom the mark is elsewhere meanwhile.
+  await tracked(context);
+  await ann.press('p');
+  await page.locator('.video.frozen').waitFor();
+  await sleep(500);
   const before = await revision();
   const from = await onPage(context, ann, before);
   await page.mouse.move(...from);
@@ -335,6 +349,7 @@ async function moved(context, mark) {
       ? `moved ${(1000 * away(after, given)).toFixed(0)} mm, revisions ${before.revision}, ${given.revision}, ${after.revision}`
       : await noteOf(ann),
   );
+  await ann.press('p');
 }
 
 export async function selectRow({ page }, id) {

@@ -98,6 +98,21 @@ describe('what others point at', () => {
     expect(book.list(1000)).toHaveLength(1);
     expect(book.list(2000)).toHaveLength(0);
   });
+
+  it('is told to whoever draws it at once, with what is new already in the book', () => {
+    const book = new PointerBook();
+    const drawn: number[] = [];
+    book.heard = () => drawn.push(book.list(0).length);
+    say(book, { kind: PointerKind.LASER, pointsInWorldM: [at(1)] });
+    say(book, { kind: PointerKind.LASER, released: true });
+    expect(drawn).toEqual([1, 0]);
+  });
+
+  it('is told to whoever measures, and nothing of it is kept', () => {
+    const book = new PointerBook();
+    for (let i = 0; i < 50; ++i) say(book, { kind: PointerKind.LASER, pointsInWorldM: [at(i)] });
+    expect(performance.getEntriesByName('saccade.pointer.heard')).toHaveLength(0);
+  });
 });
 
 describe('pointing', () => {
