@@ -22,9 +22,9 @@ constexpr double kMostFrameRedness = 0.3;
 constexpr double kLeastWhite = 0.2;
 // Brighter than the frame near by, of the contrast to white: covered, or in glare.
 constexpr double kBlackTolerance = 0.13, kRedTolerance = 0.35, kNoise = 5;
-// A reflection brightens cells, too, but nowhere as suddenly as the edge of what covers one: over
-// an eighth of the side, of the contrast. Looked for only in squares that are large enough.
-constexpr double kMostGlare = 0.75, kMostBend = 0.11, kBendNoise = 4;
+// A reflection brightens cells, too, but bends nowhere as sharply as the edge of what covers one:
+// of its height, over an eighth of the side to either hand. Only squares so large are looked at.
+constexpr double kMostGlare = 0.75, kMostBend = 0.8, kLeastBend = 0.1, kBendNoise = 4;
 constexpr double kGlareSide_px = 32;
 constexpr int kGrid = 15;  // places across the square, a sixteenth of the side apart
 // Red of the reddest cell that still is black, and that is red: in cells of a few pixels their
@@ -185,8 +185,9 @@ class Reader {
     return sum / (each * each);
   }
 
-  /// Whether green and blue change within the square as gently as light does, not as by edges.
-  bool IsSmooth() const {
+  /// Whether green and blue change within the square as gently as light does, for `height`
+  /// grey levels more, not as by edges.
+  bool IsSmooth(double height) const {
     if (side_px_ < kGlareSide_px) return false;
     std::array<std::array<Color, kGrid>, kGrid> at;
     constexpr double kPitch = 1.0 / (kGrid + 1);
@@ -200,7 +201,7 @@ class Reader {
         }
       }
     }
-    const double most = kMostBend * contrast_ + kBendNoise;
+    const double most = std::max(kMostBend * height, kLeastBend * contrast_ + kBendNoise);
     const auto bent = [&](const Color& a, const Color& b, const Color& c) {
       return (a - 2 * b + c).head<2>().cwiseAbs().maxCoeff() > most;
     };
@@ -230,7 +231,7 @@ class Reader {
     const Color more = color - black;
     const double above = more.head<2>().maxCoeff();
     if (above > (red ? kRedTolerance : kBlackTolerance) * contrast_ + kNoise &&
-        (above > kMostGlare * contrast_ || !IsSmooth())) {
+        (above > kMostGlare * contrast_ || !IsSmooth(above))) {
       return absl::InvalidArgumentError(absl::StrCat(name, " is covered, or in glare"));
     }
     return red;

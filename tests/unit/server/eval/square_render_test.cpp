@@ -39,7 +39,8 @@ TEST(KollerDetector, FindsItsSquaresAndClaimsWhatItsCornersAre) {
   }
   EXPECT_EQ(score.wrong(), 0);
   EXPECT_GE(score.VisibleFound(), 0.975);  // 0.99 of ten thousand: saccade-eval markers --renders
-  EXPECT_GE(score.BorderCoveredFound(), 0.8);
+  // What is covered by something as dark as the square is refused: cells could be, too.
+  EXPECT_GE(score.BorderCoveredFound(), 0.25);
   EXPECT_GT(score.Nees(), 1.3);
   EXPECT_LT(score.Nees(), 2.9);
 }
@@ -68,8 +69,11 @@ TEST(KollerDetector, AMirroredPictureIsRefusedWhereTheIdsAreKnown) {
   const auto detector = MakeMarkerDetector("koller", {{}, 1, {0, 1, 2, 3, 4, 5, 6, 7}});
   EXPECT_EQ((*detector)->Detect(both).size(), 2u);
   EXPECT_TRUE((*detector)->Detect(mirrored).empty());  // as 1 and 8
-  ASSERT_EQ((*detector)->dropped().size(), 2u);
-  EXPECT_THAT((*detector)->dropped()[0].reason, HasSubstr("mirrored"));
+  int told = 0;
+  for (const MarkerDrop& drop : (*detector)->dropped()) {
+    told += drop.id >= 0 && drop.reason.find("mirrored") != std::string::npos;
+  }
+  EXPECT_EQ(told, 2);
 }
 
 TEST(KollerDetector, FindsNothingInGreyInNoiseNorInNothing) {
