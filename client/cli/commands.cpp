@@ -226,6 +226,7 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kCameras:
     case Command::kRecord:
     case Command::kCalibrateCamera:
+    case Command::kPrintMarkers:
       break;  // asks no server
   }
   return absl::InternalError("unknown command");

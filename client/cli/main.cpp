@@ -60,6 +60,7 @@ absl::Status RunCommand(cli::Options& options) {
   if (options.command == cli::Command::kCameras) return cli::RunCameras(options);
   if (options.command == cli::Command::kRecord) return cli::RunRecord(options);
   if (options.command == cli::Command::kCalibrateCamera) return cli::RunCalibrateCamera(options);
+  if (options.command == cli::Command::kPrintMarkers) return cli::RunPrintMarkers(options);
   return RunWithSession(options);
 }
 

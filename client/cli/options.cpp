@@ -101,7 +101,8 @@ Command CommandOf(const CLI::App& app) {
       {"pause-picture", Command::kPausePicture},
       {"cameras", Command::kCameras},
       {"record", Command::kRecord},
-      {"calibrate-camera", Command::kCalibrateCamera}};
+      {"calibrate-camera", Command::kCalibrateCamera},
+      {"print", Command::kPrintMarkers}};
   const CLI::App* chosen = app.get_subcommands().front();
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());

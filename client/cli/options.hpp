@@ -51,6 +51,7 @@ enum class Command {
   kCameras,  // of this machine; asks no server
   kRecord,   // likewise
   kCalibrateCamera,
+  kPrintMarkers,
 };
 
 /// The command line, parsed and checked.
@@ -92,6 +93,9 @@ struct Options {
     std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them
     std::string board, square, lens;              // calibrate-camera
   } record;
+  struct Markers {
+    std::string family, ids, size, paper;  // print; as typed
+  } markers;
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".

@@ -35,7 +35,23 @@ absl::Status BecomeEval(std::vector<std::string> words) {
   execv(program.c_str(), argv.data());
   return absl::NotFoundError(
       absl::StrCat(program, ": cannot be started (", std::strerror(errno),
-                   "); sources are opened by it: install it beside saccade"));
+                   "); it opens sources and draws markers: install it beside saccade"));
+}
+
+void AddMarkers(CLI::App& app, Options& options) {
+  CLI::App* markers = app.add_subcommand("markers", "Square markers on walls and things");
+  markers->require_subcommand(1);
+  CLI::App* print = markers->add_subcommand(
+      "print", "Draw sheets of markers to be printed, with a ruler to check the printer by");
+  print
+      ->add_option("--family", options.markers.family,
+                   "koller (print in colour), apriltag36h11, aruco_4x4_50, ...")
+      ->required();
+  print->add_option("--ids", options.markers.ids, "0:8 (0 to 7), 3 or 1,4,9")->required();
+  print->add_option("--size-m", options.markers.size, "Side of the black border [m]: 0.16")
+      ->required();
+  print->add_option("--out", options.out, "A new .pdf; or, of one page, .svg or .png")->required();
+  print->add_option("--paper", options.markers.paper, "a4 (the default) or letter");
 }
 
 }  // namespace
@@ -71,6 +87,7 @@ void AddMachine(CLI::App& app, Options& options) {
                         "Half-open range A:B of frames, from zero");
   calibrate->add_option("--for", options.record.seconds,
                         "End after so many seconds; else a camera ends when nothing is missing");
+  AddMarkers(app, options);
 }
 
 absl::Status RunRecord(const Options& options) {
@@ -92,6 +109,15 @@ absl::Status RunCalibrateCamera(const Options& options) {
             {"--for", options.record.seconds}},
            words);
   if (options.json) words.emplace_back("--json");
+  return BecomeEval(std::move(words));
+}
+
+absl::Status RunPrintMarkers(const Options& options) {
+  std::vector<std::string> words = {
+      "print-markers",     "--family", options.markers.family, "--ids",
+      options.markers.ids, "--size-m", options.markers.size,   "--out",
+      options.out};
+  AddGiven({{"--paper", options.markers.paper}}, words);
   return BecomeEval(std::move(words));
 }
 

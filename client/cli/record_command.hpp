@@ -10,7 +10,7 @@ class App;
 
 namespace saccade::cli {
 
-/// `saccade cameras|record|calibrate-camera`, which need no server.
+/// `saccade cameras|record|calibrate-camera|markers print`, which need no server.
 void AddMachine(CLI::App& app, Options& options);
 
 /// `saccade record`: becomes `saccade-eval record`, which lies beside this program and links the
@@ -19,5 +19,8 @@ absl::Status RunRecord(const Options& options);
 
 /// Becomes `saccade-eval calibrate-camera` likewise.
 absl::Status RunCalibrateCamera(const Options& options);
+
+/// Becomes `saccade-eval print-markers` likewise.
+absl::Status RunPrintMarkers(const Options& options);
 
 }  // namespace saccade::cli

@@ -42,3 +42,4 @@ foreach(module core imgproc imgcodecs calib3d features2d flann video aruco)
 endforeach()
 # Square markers.
 find_package(apriltag CONFIG REQUIRED)
+pkg_check_modules(Cairo REQUIRED IMPORTED_TARGET cairo cairo-pdf cairo-svg)  # sheets of them

@@ -58,10 +58,20 @@ struct CalibrateArguments {
 };
 struct MarkersArguments {
   std::filesystem::path images, out;
-  std::string detector;               // apriltag, aruco
+  std::string detector;               // apriltag, aruco, koller
   std::vector<std::string> families;  // none: what can hardly be taken for something else
   int border_bits = 0;                // of the code's cells; 0: 1, and for a sheet what reads more
   std::string grid;  // aprilgrid.yaml, or 6x6:0.088:0.3; empty: the folder's own; "none"
+  std::string ids;   // of koller, that are on the walls: 0:8; empty for any
+  int renders = 0;   // instead of pictures: so many are made, with truth
+  std::uint64_t seed = 1;
+  int keep = 0;  // of the renders, written as pictures
+};
+struct PrintMarkersArguments {
+  std::string family, ids;  // koller, apriltag36h11, ...; 0:8, 3, 1,4,9
+  double side_m = 0;
+  std::string paper = "a4";  // or letter
+  std::filesystem::path out;
 };
 struct CalibrateTargetArguments {
   std::filesystem::path images;
@@ -95,6 +105,10 @@ absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments);
 /// Finds square markers in the pictures of a folder; DIR/detections.csv: file, family, id, four
 /// corners [px], four variances [px^2].
 absl::Status MarkersCommand(const MarkersArguments& arguments);
+/// Finds them in renders: DIR/truth.csv, detections.csv, report.json (slam-spec T20, T21).
+absl::Status MarkersRenderCommand(const MarkersArguments& arguments);
+/// Sheets of markers to be printed: what `saccade markers print` becomes.
+absl::Status PrintMarkersCommand(const PrintMarkersArguments& arguments);
 /// Finds a lens from the pictures of a folder that show a board or a sheet of tags, and writes it
 /// as camera.yaml.
 absl::Status CalibrateTargetCommand(const CalibrateTargetArguments& arguments);

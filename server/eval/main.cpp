@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "server/eval/commands.hpp"
+#include "server/eval/markers/marker_flags.hpp"
 #include "shared/version/version.hpp"
 
 namespace saccade {
@@ -160,27 +161,6 @@ void AddCalibrateCamera(CLI::App& app, CalibrateArguments& arguments) {
   calibrate->add_flag("--json", arguments.json, "Print report and progress as JSON");
 }
 
-void AddMarkers(CLI::App& app, MarkersArguments& arguments) {
-  CLI::App* markers = app.add_subcommand("markers", "Find square markers in pictures");
-  markers->add_option("--images", arguments.images, "Folder of pictures")->required();
-  markers->add_option("--detector", arguments.detector, "apriltag or aruco")
-      ->check(CLI::IsMember({"apriltag", "aruco"}))
-      ->required();
-  markers
-      ->add_option("--family", arguments.families,
-                   "apriltag36h11, aruco_4x4_50, ...; may be repeated; else those that can hardly "
-                   "be taken for something else")
-      ->take_all();
-  markers
-      ->add_option("--border-bits", arguments.border_bits,
-                   "Width of the black border in cells; else 1, and for a sheet what reads more")
-      ->check(CLI::Range(1, 4));
-  markers->add_option("--grid", arguments.grid,
-                      "Kalibr's aprilgrid.yaml, or 6x6:0.088:0.3, whose tags are searched for "
-                      "where they must be; else the folder's aprilgrid.yaml; none for neither");
-  markers->add_option("--out", arguments.out, "Folder for detections.csv")->required();
-}
-
 void AddCalibrateTarget(CLI::App& app, CalibrateTargetArguments& arguments) {
   CLI::App* calibrate =
       app.add_subcommand("calibrate", "Find a camera's lens from pictures of a target");
@@ -246,6 +226,7 @@ int Main(int argc, char** argv) {
   CalibrateArguments calibrate;
   PoseGraphArguments graph;
   MarkersArguments markers;
+  PrintMarkersArguments print;
   CalibrateTargetArguments target;
   AddRun(app, run);
   AddScore(app, score);
@@ -255,6 +236,7 @@ int Main(int argc, char** argv) {
   AddCalibrateCamera(app, calibrate);
   AddPoseGraph(app, graph);
   AddMarkers(app, markers);
+  AddPrintMarkers(app, print);
   AddCalibrateTarget(app, target);
   try {
     app.parse(argc, argv);
@@ -269,7 +251,10 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("record")) status = RecordCommand(record);
   if (app.got_subcommand("calibrate-camera")) status = CalibrateCameraCommand(calibrate);
   if (app.got_subcommand("posegraph")) status = PoseGraphCommand(graph);
-  if (app.got_subcommand("markers")) status = MarkersCommand(markers);
+  if (app.got_subcommand("print-markers")) status = PrintMarkersCommand(print);
+  if (app.got_subcommand("markers")) {
+    status = markers.renders > 0 ? MarkersRenderCommand(markers) : MarkersCommand(markers);
+  }
   if (app.got_subcommand("calibrate")) status = CalibrateTargetCommand(target);
   return status.ok() ? 0 : Fail(status);
 }

@@ -14,6 +14,8 @@ constexpr float kSmoothed_px = 0.8F;
 // Mean difference of a bit from the threshold: noise decodes as something, but not clearly.
 constexpr float kLeastMargin = 5;
 // Tags of a dozen pixels are found when they are twice as large.
+// In smaller tags the white cells next to the border draw on lines of our own.
+constexpr double kLinesFrom_px = 56;
 constexpr double kEnlarged = 2.0;
 constexpr int kMostEnlargedPixels = 3'000'000;
 
@@ -81,7 +83,7 @@ std::vector<MarkerSighting> ApriltagDetector::Detect(const cv::Mat& grey) {
     cv::resize(grey, enlarged, {}, kEnlarged, kEnlarged, cv::INTER_CUBIC);
     Look(enlarged, kEnlarged, 0, found);
   }
-  for (MarkerSighting& sighting : found) RefineCorners(grey, sighting);
+  for (MarkerSighting& sighting : found) RefineCorners(grey, kLinesFrom_px, 0, sighting);
   return found;
 }
 

@@ -34,6 +34,8 @@ constexpr std::array kKnown = {
     Known{"aruco_4x4_250", cv::aruco::DICT_4X4_250, false},
     Known{"aruco_4x4_1000", cv::aruco::DICT_4X4_1000, false},
 };
+// Of corners that no lines were found for: OpenCV's own are drawn inwards.
+constexpr double kKeptVariance_px2 = 0.5 * 0.5;
 constexpr double kEnlarged = 2.0;
 constexpr int kMostEnlargedPixels = 3'000'000;
 
@@ -113,7 +115,7 @@ std::vector<MarkerSighting> ArucoDetector::Detect(const cv::Mat& grey) {
     Look(grey, kEnlarged, found);
   }
   DropGuesses(found);
-  for (MarkerSighting& sighting : found) RefineCorners(grey, sighting);
+  for (MarkerSighting& sighting : found) RefineCorners(grey, 0, kKeptVariance_px2, sighting);
   return found;
 }
 

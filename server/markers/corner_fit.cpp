@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
+
+#include "server/markers/border_fit.hpp"
 
 namespace saccade {
 namespace {
@@ -17,6 +20,11 @@ constexpr double kLeastVariance_px2 = 0.04 * 0.04;
 constexpr double kNoise = 4.0;
 // A corner of line fits that could not be looked at more closely.
 constexpr double kUnrefinedVariance_px2 = 0.3 * 0.3;
+// Lines beside a square that was found, and how far they may move its corners.
+constexpr double kLinesReach_px = 2, kWideReachOfSide = 0.08;
+constexpr double kMostMoved_px = 3, kMostMovedOfSide = 0.1;
+// Where there are none: something covers a side, and the corner may be anywhere.
+constexpr double kUnknownOfSide = 0.04;
 constexpr int kLeastReach_px = 2, kMostReach_px = 5;
 constexpr double kReachOfSide = 0.12;  // the border of a tag with eight cells is an eighth wide
 constexpr int kRingPoints = 32;
@@ -95,14 +103,39 @@ bool IsSaddle(const cv::Mat& grey, const Eigen::Vector2d& pixel, double radius_p
   return changes == 4;
 }
 
-void RefineCorners(const cv::Mat& grey, MarkerSighting& sighting) {
-  const int reach = CornerReach(ShortestSide(sighting));
+void RefineCorners(const cv::Mat& grey, double least_side_px, double kept_variance_px2,
+                   MarkerSighting& sighting) {
+  const double side = ShortestSide(sighting);
+  const int reach = CornerReach(side);
+  std::array<bool, 4> lone{};
+  const std::array<Eigen::Vector2d, 4> given = sighting.corners;
   for (int k = 0; k < 4; ++k) {
-    sighting.variance_px2[k] = kUnrefinedVariance_px2;
-    const std::optional<CornerFit> fit = FitCorner(grey, sighting.corners[k], reach);
+    lone[k] = true;
+    sighting.variance_px2[k] = std::max(kept_variance_px2, kUnrefinedVariance_px2);
+    const std::optional<CornerFit> fit = FitCorner(grey, given[k], reach);
     if (!fit) continue;
+    sighting.variance_px2[k] = std::max(kept_variance_px2, fit->variance_px2);
+    if (!IsSaddle(grey, fit->pixel, reach)) continue;
+    lone[k] = false;
+    sighting.corners[k] = fit->pixel;
     sighting.variance_px2[k] = fit->variance_px2;
-    if (IsSaddle(grey, fit->pixel, reach)) sighting.corners[k] = fit->pixel;
+  }
+  if (side < least_side_px || std::none_of(lone.begin(), lone.end(), std::identity())) return;
+  BorderFitOptions options;
+  options.reach_px = kLinesReach_px;
+  std::optional<BorderFit> lines = FitBorder(grey, given, options);
+  if (!lines) {
+    options.reach_px = std::max(kLinesReach_px, kWideReachOfSide * side);
+    lines = FitBorder(grey, given, options);
+  }
+  for (int k = 0; k < 4; ++k) {
+    if (!lone[k]) continue;
+    if (!lines || (lines->corners[k] - given[k]).norm() > kMostMoved_px + kMostMovedOfSide * side) {
+      sighting.variance_px2[k] += std::pow(kUnknownOfSide * side, 2);
+      continue;
+    }
+    sighting.corners[k] = lines->corners[k];
+    sighting.variance_px2[k] = lines->variance_px2[k];
   }
 }
 

@@ -24,9 +24,12 @@ std::optional<CornerFit> FitCorner(const cv::Mat& grey, const Eigen::Vector2d& s
 /// surround: as between the tags of an AprilGrid.
 bool IsSaddle(const cv::Mat& grey, const Eigen::Vector2d& pixel, double radius_px);
 
-/// Refines the corners that are saddles where they are, and gives all a variance; corners of lone
-/// squares stay where the detector's line fits put them.
-void RefineCorners(const cv::Mat& grey, MarkerSighting& sighting);
+/// Refines the corners that are saddles where they are. Those of lone squares, of which a gradient
+/// fit is drawn inwards, become where lines along the border meet, if the shortest side has at
+/// least `least_side_px`; else, and where there are no such lines, they stay. Gives all a variance:
+/// of those that stay, `kept_variance_px2` or what the gradients about them say, what is more.
+void RefineCorners(const cv::Mat& grey, double least_side_px, double kept_variance_px2,
+                   MarkerSighting& sighting);
 
 /// How far from a corner of a square with this side its surroundings are its own [px].
 int CornerReach(double side_px);

@@ -69,6 +69,7 @@ const std::vector<Home>& Homes() {
       {"libavcodec/", {"server/capture"}},
       {"seccomp.h", {"server/capture"}},
       {"apriltag/", {"server/markers"}},
+      {"cairo", {"server/markers"}},
       {"opencv2/aruco", {"server/markers"}},
       {"opencv2/videoio", {}},
       {"opencv2/highgui", {}},

@@ -4,32 +4,22 @@
 #include <iostream>
 #include <map>
 
+#include "server/capture/image_file.hpp"
 #include "server/eval/calibrate/grid_pictures.hpp"
 #include "server/eval/commands.hpp"
 #include "server/eval/markers/picture_folder.hpp"
+#include "server/eval/markers/sighting_csv.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/markers/marker_detector.hpp"
+#include "server/markers/marker_sheet.hpp"
 #include "shared/io/regular_file.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr char kHeader[] =
-    "file,family,id,x0,y0,x1,y1,x2,y2,x3,y3,variance0,variance1,variance2,variance3\n";
-
-std::string Row(const std::filesystem::path& file, const MarkerSighting& sighting) {
-  std::string row = absl::StrCat(file.filename().string(), ",", sighting.family, ",", sighting.id);
-  for (const Eigen::Vector2d& corner : sighting.corners) {
-    absl::StrAppendFormat(&row, ",%.4f,%.4f", corner.x(), corner.y());
-  }
-  for (const double variance : sighting.variance_px2)
-    absl::StrAppendFormat(&row, ",%.6g", variance);
-  return row + "\n";
-}
-
 /// The sheet that the pictures show: named, or the folder's own; none is no error.
 absl::StatusOr<std::optional<TagGrid>> GridOf(const MarkersArguments& arguments) {
-  if (arguments.grid == "none") return std::nullopt;
+  if (arguments.grid == "none" || arguments.detector == kKollerFamily) return std::nullopt;
   const std::filesystem::path own = arguments.images / "aprilgrid.yaml";
   if (arguments.grid.empty() && !MayExist(own)) return std::nullopt;
   const absl::StatusOr<TagGrid> grid = arguments.grid.empty()     ? LoadTagGrid(own)
@@ -59,17 +49,51 @@ void SayProgress(const std::string& step, std::size_t done, std::size_t all) {
   if (done % 50 == 0 || done == all) std::cerr << step << ": " << done << " of " << all << "\n";
 }
 
+/// In words, what is no marker and why.
+void SayDropped(const std::string& file, const std::vector<MarkerDrop>& dropped) {
+  for (const MarkerDrop& drop : dropped) {
+    std::cerr << absl::StrFormat("%s: %s%s at %.0f,%.0f is left out: %s\n", file, drop.family,
+                                 drop.id < 0 ? std::string(" square") : absl::StrCat(" ", drop.id),
+                                 drop.middle.x(), drop.middle.y(), drop.reason);
+  }
+}
+
+/// Grey, or where the detector asks for it and the file has it, in colour.
+cv::Mat ForDetector(const MarkerDetector& detector, const Picture& picture) {
+  return detector.needs_color() ? picture.color : picture.grey;
+}
+
+/// Who turned a picture about shall be told why nothing is in it.
+void SayIfMirrored(const std::string& file, MarkerDetector& detector, const cv::Mat& picture) {
+  const std::size_t there = CountIfMirrored(detector, picture);
+  if (there == 0) return;
+  std::cerr << file << ": the picture is mirrored: " << there
+            << " markers are read in its mirror image, none in it; turn mirroring off where it "
+               "was taken\n";
+}
+
 /// Each picture by itself.
 absl::Status DetectEach(const std::vector<std::filesystem::path>& files, MarkerDetector& detector,
                         OutputFile& out, Tally& tally) {
   for (std::size_t k = 0; k < files.size(); ++k) {
-    const absl::StatusOr<cv::Mat> grey = LoadGrey(files[k]);
-    if (grey.ok()) {
-      const std::vector<MarkerSighting> sightings = detector.Detect(*grey);
-      for (const MarkerSighting& sighting : sightings) out.Write(Row(files[k], sighting));
+    const absl::StatusOr<Picture> picture = LoadPicture(files[k]);
+    if (picture.ok()) {
+      const std::string file = files[k].filename().string();
+      const cv::Mat seen = ForDetector(detector, *picture);
+      if (seen.empty()) {
+        SayUnreadable(absl::InvalidArgumentError(absl::StrCat(
+                          files[k].string(), " is grey; koller's squares are read in colour")),
+                      tally);
+        continue;
+      }
+      std::vector<MarkerSighting> sightings = detector.Detect(seen);
+      SayDropped(file, detector.dropped());
+      SayDropped(file, DropRepeated(sightings));
+      if (sightings.empty()) SayIfMirrored(file, detector, seen);
+      for (const MarkerSighting& sighting : sightings) out.Write(SightingRow(file, sighting));
       Count(sightings, tally);
     } else {
-      SayUnreadable(grey.status(), tally);
+      SayUnreadable(picture.status(), tally);
     }
     SayProgress("reading", k + 1, files.size());
   }
@@ -104,7 +128,8 @@ absl::Status DetectGrid(const std::vector<std::filesystem::path>& files, const T
   for (const GridPicture& picture : pictures.pictures()) {
     const std::vector<MarkerSighting>& sightings =
         picture.found ? picture.found->sightings : picture.read;
-    for (const MarkerSighting& sighting : sightings) out.Write(Row(picture.file, sighting));
+    for (const MarkerSighting& sighting : sightings)
+      out.Write(SightingRow(picture.file.filename().string(), sighting));
     Count(sightings, tally);
   }
   return out.status();
@@ -115,15 +140,23 @@ absl::Status DetectGrid(const std::vector<std::filesystem::path>& files, const T
 absl::Status MarkersCommand(const MarkersArguments& arguments) {
   const auto files = PicturesIn(arguments.images);
   if (!files.ok()) return files.status();
-  auto detector = MakeMarkerDetector(arguments.detector,
-                                     {arguments.families, std::max(1, arguments.border_bits)});
+  MarkerOptions options{arguments.families, std::max(1, arguments.border_bits), {}};
+  if (!arguments.ids.empty()) {
+    absl::StatusOr<std::vector<int>> ids = ParseMarkerIds(arguments.ids);
+    if (!ids.ok()) return ids.status();
+    options.ids = *std::move(ids);
+  }
+  auto detector = MakeMarkerDetector(arguments.detector, options);
   if (!detector.ok()) return detector.status();
+  if ((*detector)->needs_color() && !arguments.grid.empty() && arguments.grid != "none") {
+    return absl::InvalidArgumentError("--grid: a sheet is of AprilTags; leave it out with koller");
+  }
   const absl::StatusOr<std::optional<TagGrid>> grid = GridOf(arguments);
   if (!grid.ok()) return grid.status();
   if (absl::Status made = CreateFolder(arguments.out); !made.ok()) return made;
   absl::StatusOr<OutputFile> out = OutputFile::Create(arguments.out / "detections.csv");
   if (!out.ok()) return out.status();
-  out->Write(kHeader);
+  out->Write(kSightingHeader);
   Tally tally;
   const absl::Status done = *grid ? DetectGrid(*files, **grid, arguments, *out, tally)
                                   : DetectEach(*files, **detector, *out, tally);

@@ -159,7 +159,7 @@ TEST(MarkerDetector, FindsNothingInNoiseNorInNothing) {
 
 TEST(MarkerDetector, WhatThereIsNotIsRefusedByName) {
   EXPECT_THAT(std::string(MakeMarkerDetector("qr", {}).status().message()),
-              HasSubstr("apriltag, aruco"));
+              HasSubstr("apriltag, aruco, koller"));
   EXPECT_THAT(std::string(MakeMarkerDetector("apriltag", {{"aruco_4x4_50"}, 1}).status().message()),
               HasSubstr("apriltag36h11"));
   EXPECT_THAT(std::string(MakeMarkerDetector("aruco", {{}, 9}).status().message()),
