@@ -1,6 +1,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "shared/camera/camera_model.hpp"
 
@@ -11,10 +12,10 @@ namespace saccade {
 inline constexpr double kAssumedView_deg = 60.0;
 
 /// For SourceInfo::remark, and the log.
-inline constexpr char kAssumedLensWords[] =
-    "lens assumed: 60 deg wide, no distortion, not metric; give --camera camera.yaml";
+std::string AssumedLensWords(double view_deg = kAssumedView_deg);
 
 /// `size`: of the upright picture; `turned`: its sides are swapped against the sensor's.
-CameraIntrinsics AssumedLens(cv::Size size, bool turned, double fps);
+CameraIntrinsics AssumedLens(cv::Size size, bool turned, double fps,
+                             double view_deg = kAssumedView_deg);
 
 }  // namespace saccade

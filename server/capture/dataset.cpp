@@ -249,6 +249,7 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenDataset(const std::filesystem::
   SourceInfo info;
   info.uri = absl::StrCat("dataset:", folder.string());
   info.remark = layout->remark;
+  info.lens_assumed = layout->lens_assumed;
   if (!info.remark.empty()) Log(absl::StrCat("source ", info.uri, ": ", info.remark));
   info.camera = std::make_shared<const CameraModel>(layout->camera);
   info.frame_count = end - options.first_frame;
@@ -279,7 +280,10 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenDatasetUri(absl::string_view re
   UriQuery query("dataset:", rest);
   SourceOptions with_rate = options;
   if (const std::optional<double> fps = query.Number("fps", 0.1, 1000)) with_rate.fps = fps;
-  if (const absl::Status status = query.Finish("fps"); !status.ok()) return status;
+  if (const std::optional<double> view_deg = query.Number("fov", 10, 150)) {
+    with_rate.view_deg = view_deg;
+  }
+  if (const absl::Status status = query.Finish("fps and fov"); !status.ok()) return status;
   return OpenDataset(query.path(), with_rate);
 }
 

@@ -31,6 +31,51 @@ absl::Status NoRate(const std::filesystem::path& folder, const std::filesystem::
                                                  " has time stamps of its own; leave it out"));
 }
 
+/// A lens for pictures that come with none, by the first that can be read.
+absl::Status AssumeLens(double fps, const SourceOptions& options, DatasetLayout& layout) {
+  constexpr std::size_t kTries = 50;
+  absl::Status last;
+  for (std::size_t i = 0; i < std::min(kTries, layout.entries.size()); ++i) {
+    const absl::StatusOr<Picture> picture = LoadPicture(layout.pictures / layout.entries[i].file);
+    last = picture.status();
+    if (!picture.ok()) continue;
+    const double view_deg = options.view_deg.value_or(kAssumedView_deg);
+    layout.camera = AssumedLens(picture->grey.size(), /*turned=*/false, fps, view_deg);
+    layout.camera_file = "the first picture";
+    layout.remark = AssumedLensWords(view_deg);
+    layout.lens_assumed = true;
+    return absl::OkStatus();
+  }
+  return absl::DataLossError(absl::StrCat("no picture can be decoded; ", last.message()));
+}
+
+/// Pictures a second, by the times of the list; 0: it has too few.
+double RateOf(const std::vector<ImageEntry>& entries) {
+  if (entries.size() < 2) return 0.0;
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < entries.size(); ++i) {
+    steps_s.push_back(1e-9 * static_cast<double>(entries[i].time_ns - entries[i - 1].time_ns));
+  }
+  std::nth_element(steps_s.begin(), steps_s.begin() + std::ssize(steps_s) / 2, steps_s.end());
+  const double middle_s = steps_s[steps_s.size() / 2];
+  return middle_s > 0.0 ? 1.0 / middle_s : 0.0;
+}
+
+/// The recording's lens: as it is said to be, or assumed where `options` allow it.
+absl::Status ReadLens(const std::filesystem::path& own, const SourceOptions& options,
+                      DatasetLayout& layout) {
+  const bool missing = options.camera_file.empty() && !MayExist(own);
+  if (options.view_deg || (missing && options.lens_may_be_missing)) {
+    return AssumeLens(RateOf(layout.entries), options, layout);
+  }
+  const absl::StatusOr<CameraIntrinsics> camera = LoadCamera(
+      options.camera_file.empty() ? own : options.camera_file,
+      [&] { return SizeOfFirstPicture(layout.pictures, layout.entries, options.first_frame); });
+  if (!camera.ok()) return camera.status();
+  layout.camera = *camera;
+  return absl::OkStatus();
+}
+
 absl::StatusOr<DatasetLayout> ReadTum(const std::filesystem::path& folder,
                                       const SourceOptions& options) {
   DatasetLayout layout{.list = folder / "rgb.txt",
@@ -38,16 +83,15 @@ absl::StatusOr<DatasetLayout> ReadTum(const std::filesystem::path& folder,
                        .entries = {},
                        .camera = {},
                        .camera_file = "camera.yaml",
-                       .remark = ""};
+                       .remark = "",
+                       .lens_assumed = false};
   if (options.fps) return NoRate(folder, layout.list);
   absl::StatusOr<std::vector<ImageEntry>> entries = LoadImageList(layout.list);
   if (!entries.ok()) return entries.status();
   layout.entries = *std::move(entries);
-  const absl::StatusOr<CameraIntrinsics> camera =
-      LoadCamera(options.camera_file.empty() ? folder / "camera.yaml" : options.camera_file,
-                 [&] { return SizeOfFirstPicture(folder, layout.entries, options.first_frame); });
-  if (!camera.ok()) return camera.status();
-  layout.camera = *camera;
+  if (const absl::Status status = ReadLens(folder / "camera.yaml", options, layout); !status.ok()) {
+    return status;
+  }
   return layout;
 }
 
@@ -59,16 +103,15 @@ absl::StatusOr<DatasetLayout> ReadEuroc(const std::filesystem::path& folder,
                        .entries = {},
                        .camera = {},
                        .camera_file = "sensor.yaml",
-                       .remark = ""};
+                       .remark = "",
+                       .lens_assumed = false};
   if (options.fps) return NoRate(folder, layout.list);
   absl::StatusOr<std::vector<ImageEntry>> entries = LoadEurocList(layout.list);
   if (!entries.ok()) return entries.status();
   layout.entries = *std::move(entries);
-  const absl::StatusOr<CameraIntrinsics> camera = LoadCamera(
-      options.camera_file.empty() ? cam0 / "sensor.yaml" : options.camera_file,
-      [&] { return SizeOfFirstPicture(layout.pictures, layout.entries, options.first_frame); });
-  if (!camera.ok()) return camera.status();
-  layout.camera = *camera;
+  if (const absl::Status status = ReadLens(cam0 / "sensor.yaml", options, layout); !status.ok()) {
+    return status;
+  }
   if (!options.camera_file.empty()) layout.camera_file = "the camera file";
   return layout;
 }
@@ -116,18 +159,6 @@ std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
   return names;
 }
 
-/// A lens for pictures that come with none, by the first that can be read.
-absl::StatusOr<CameraIntrinsics> AssumeLens(const DatasetLayout& layout, double fps) {
-  constexpr std::size_t kTries = 50;
-  absl::Status last;
-  for (std::size_t i = 0; i < std::min(kTries, layout.entries.size()); ++i) {
-    const absl::StatusOr<Picture> picture = LoadPicture(layout.pictures / layout.entries[i].file);
-    if (picture.ok()) return AssumedLens(picture->grey.size(), /*turned=*/false, fps);
-    last = picture.status();
-  }
-  return absl::DataLossError(absl::StrCat("no picture can be decoded; ", last.message()));
-}
-
 absl::StatusOr<DatasetLayout> ReadPictures(const std::filesystem::path& folder,
                                            const std::vector<std::string>& names,
                                            const SourceOptions& options) {
@@ -142,25 +173,18 @@ absl::StatusOr<DatasetLayout> ReadPictures(const std::filesystem::path& folder,
                        .entries = {},
                        .camera = {},
                        .camera_file = "camera.yaml",
-                       .remark = ""};
+                       .remark = "",
+                       .lens_assumed = false};
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto time_ns =
         static_cast<Timestamp>(std::llround(1e9 * static_cast<double>(i) / *options.fps));
     layout.entries.push_back({EurocSeconds(time_ns), time_ns, names[i], static_cast<int>(i + 1)});
   }
-  const std::filesystem::path own = folder / "camera.yaml";
-  absl::StatusOr<CameraIntrinsics> camera = CameraIntrinsics();
-  if (!options.camera_file.empty() || MayExist(own)) {
-    camera = LoadCamera(options.camera_file.empty() ? own : options.camera_file, [&] {
-      return SizeOfFirstPicture(folder, layout.entries, options.first_frame);
-    });
-  } else {
-    camera = AssumeLens(layout, *options.fps);
-    layout.camera_file = "the first picture";
-    layout.remark = kAssumedLensWords;
+  SourceOptions lens = options;
+  lens.lens_may_be_missing = true;
+  if (const absl::Status status = ReadLens(folder / "camera.yaml", lens, layout); !status.ok()) {
+    return status;
   }
-  if (!camera.ok()) return camera.status();
-  layout.camera = *camera;
   layout.camera.fps = *options.fps;
   return layout;
 }

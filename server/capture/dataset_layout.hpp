@@ -20,6 +20,7 @@ struct DatasetLayout {
   CameraIntrinsics camera;
   std::string camera_file;  // its name, for messages
   std::string remark;       // for SourceInfo
+  bool lens_assumed = false;
 };
 
 /// Reads the folder's lists and camera, by what it holds:
@@ -27,7 +28,7 @@ struct DatasetLayout {
 ///   mav0/ (or cam0/)      EuRoC: cam0/data.csv and cam0/sensor.yaml
 ///   pictures alone        in the order of their names, numbers in them by value, `options.fps` a
 ///                         second; with camera.yaml, or an assumed lens
-/// `options.camera_file` wins over the folder's own.
+/// `options.camera_file` wins over the folder's own, `options.view_deg` over both.
 ///   NotFound         no folder, no list, no camera file
 ///   InvalidArgument  a line or field that is wrong; `fps` missing, or given beside time stamps
 absl::StatusOr<DatasetLayout> ReadDatasetLayout(const std::filesystem::path& folder,

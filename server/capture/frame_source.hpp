@@ -24,6 +24,7 @@ struct SourceInfo {
   std::optional<StartPose> start;  // nominal first pose
   std::optional<std::uint64_t> frame_count;
   std::shared_ptr<const MountModel> mount;  // what turns the camera; null: fixed to the wearer
+  bool lens_assumed = false;                // nobody measured it: it is learnt while it is tracked
 };
 
 /// Where frames come from. One thread calls Next(); the source paces itself only if it is live or

@@ -22,6 +22,9 @@ struct SourceOptions {
   bool realtime = false;              // pace by time stamps, drop frames when the reader is late
   std::filesystem::path camera_file;  // `--camera`: instead of the source's own camera.yaml
   std::optional<double> fps = {};     // of pictures or a video that have no time stamps
+  /// A recording's lens is taken to see so wide [deg], whatever its camera.yaml says.
+  std::optional<double> view_deg = {};
+  bool lens_may_be_missing = false;  // of a recording: then it is assumed
 };
 
 /// Opens sources by the scheme of their URI ("dataset:DIR"). Programs add the schemes they link.

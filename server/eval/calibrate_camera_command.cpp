@@ -1,4 +1,3 @@
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <unistd.h>
@@ -8,37 +7,18 @@
 
 #include "server/capture/camera_file.hpp"
 #include "server/capture/camera_yaml.hpp"
-#include "server/capture/source.hpp"
 #include "server/eval/calibrate/lens_report.hpp"
+#include "server/eval/calibrate/source_pictures.hpp"
 #include "server/eval/calibrate/view_picker.hpp"
 #include "server/eval/commands.hpp"
 #include "server/eval/end_at_signal.hpp"
-#include "server/eval/frame_range.hpp"
 #include "server/eval/output_file.hpp"
-#include "server/sim/sim_source.hpp"
 #include "shared/io/regular_file.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr Timestamp kSilence_ns = 2'000'000'000;
-
-absl::StatusOr<std::unique_ptr<FrameSource>> Open(const CalibrateArguments& arguments) {
-  if (absl::Status phone = RefusePhone(arguments.source); !phone.ok()) return phone;
-  const absl::StatusOr<FrameRange> range = ParseFrameRange(arguments.frames);
-  if (!range.ok()) return range.status();
-  SourceOptions options;
-  options.realtime = IsLive(arguments.source);
-  options.first_frame = range->first;
-  options.end_frame = range->end;
-  SourceRegistry sources = CaptureSources();
-  sources.Add("sim",
-              [](absl::string_view rest,
-                 const SourceOptions& with) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
-                return SimSource::OpenUri(rest, with);
-              });
-  return sources.Open(arguments.source, options);
-}
 
 /// What happens, to stderr: each view that is taken, and what is missing when none is for a while.
 class Progress {
@@ -147,7 +127,8 @@ absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments) {
   const LensModel model =
       arguments.lens == "kannala_brandt" ? LensModel::kKannalaBrandt : LensModel::kBrownConrady;
   const EndAtSignal signals;
-  const absl::StatusOr<std::unique_ptr<FrameSource>> source = Open(arguments);
+  const absl::StatusOr<std::unique_ptr<FrameSource>> source =
+      OpenToCalibrate(arguments.source, arguments.frames);
   if (!source.ok()) return source.status();
   const CameraIntrinsics& camera = (*source)->info().camera->intrinsics();
   const cv::Size picture(camera.width, camera.height);

@@ -1,6 +1,7 @@
 #include "server/eval/commands.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <iostream>
 
@@ -33,6 +34,54 @@ absl::StatusOr<Alterations> AlterationsOf(const RunArguments& arguments) {
   return alterations;
 }
 
+using Json = nlohmann::ordered_json;
+
+/// What became of a lens that was learnt; for the report.
+class LensCourse {
+ public:
+  void Note(const Frame& frame, const std::optional<LensState>& lens) {
+    if (!lens) return;
+    if (!begin_ns_) begin_ns_ = frame.capture_time_ns;
+    if (!newest_ || newest_->changes != lens->changes) {
+      Json change = ToJson(*lens);
+      change["frame"] = frame.id;
+      change["time_s"] = Seconds(frame.capture_time_ns - *begin_ns_);
+      changes_.push_back(std::move(change));
+    }
+    newest_ = lens;
+  }
+  /// `lens`: as it is in the end, and each change; nothing where it was given.
+  void Add(Json& report) const {
+    if (!newest_) return;
+    report["lens"] = ToJson(*newest_);
+    report["lens"]["learnt"] = newest_->learnt;
+    report["lens"]["course"] = changes_;
+  }
+  std::string Line() const {
+    if (!newest_) return "";
+    return absl::StrFormat("lens      %9s   f %.1f +- %.1f px, centre (%.1f, %.1f), k1 %.3f\n",
+                           newest_->learnt ? "learnt" : "learning", newest_->focal_px,
+                           newest_->focal_sigma_px, newest_->centre_px.x(), newest_->centre_px.y(),
+                           newest_->k1);
+  }
+
+ private:
+  static Json ToJson(const LensState& lens) {
+    return {{"focal_px", lens.focal_px},
+            {"focal_sigma_px", lens.focal_sigma_px},
+            {"centre_px", {lens.centre_px.x(), lens.centre_px.y()}},
+            {"centre_sigma_px", {lens.centre_sigma_px.x(), lens.centre_sigma_px.y()}},
+            {"k1", lens.k1},
+            {"k1_sigma", lens.k1_sigma},
+            {"k2", lens.k2},
+            {"k2_sigma", lens.k2_sigma}};
+  }
+
+  std::optional<Timestamp> begin_ns_;
+  std::optional<LensState> newest_;
+  Json changes_ = Json::array();
+};
+
 }  // namespace
 
 absl::Status RunCommand(const RunArguments& arguments) {
@@ -44,6 +93,8 @@ absl::Status RunCommand(const RunArguments& arguments) {
   options.first_frame = range->first;
   options.end_frame = range->end;
   if (arguments.fps > 0) options.fps = arguments.fps;
+  if (arguments.view_deg > 0) options.view_deg = arguments.view_deg;
+  options.lens_may_be_missing = true;
   auto opened = OpenDataset(arguments.dataset, options);
   if (!opened.ok()) return opened.status();
   const std::unique_ptr<FrameSource> source = Altered(*std::move(opened), *std::move(alterations));
@@ -55,10 +106,17 @@ absl::Status RunCommand(const RunArguments& arguments) {
   }
   const auto tracker = MakeTracker(source->info(), arguments.tracker);
   if (!tracker.ok()) return tracker.status();
+  LensCourse course;
   const auto report = RunTracker(
-      *source, [&](const Frame& frame) { return (*tracker)->Track(frame); }, truth, arguments.out);
+      *source,
+      [&](const Frame& frame) {
+        auto snapshot = (*tracker)->Track(frame);
+        course.Note(frame, (*tracker)->lens_state());
+        return snapshot;
+      },
+      truth, arguments.out, [&](Json& whole) { course.Add(whole); });
   if (!report.ok()) return report.status();
-  std::cout << (arguments.json ? report->dump(2) + "\n" : SummaryTable(*report));
+  std::cout << (arguments.json ? report->dump(2) + "\n" : SummaryTable(*report) + course.Line());
   return absl::OkStatus();
 }
 

@@ -22,8 +22,9 @@ struct RunArguments {
   std::string frames;             // A:B, empty for all
   std::vector<std::string> drop;  // A:B each
   std::uint64_t every = 1;
-  std::string freeze;  // K:SECONDS, empty for none
-  double fps = 0;      // of pictures without time stamps; 0: not given
+  std::string freeze;   // K:SECONDS, empty for none
+  double fps = 0;       // of pictures without time stamps; 0: not given
+  double view_deg = 0;  // 0: as camera.yaml says
   bool json = false;
 };
 struct ScoreArguments {
@@ -74,8 +75,10 @@ struct PrintMarkersArguments {
   std::filesystem::path out;
 };
 struct CalibrateTargetArguments {
-  std::filesystem::path images;
-  std::string target;   // chessboard:9x6:0.04, aprilgrid:6x6:0.088:0.3, aprilgrid:FILE
+  std::filesystem::path images;  // a folder of pictures, or...
+  std::string source, frames;    // ...a source, A:B of it
+  double seconds = 0;            // of the source; 0: to its end
+  std::string target;   // chessboard:9x6:0.04, charuco:7x5:0.04:0.03, aprilgrid:6x6:0.088:0.3
   std::string lens;     // empty: the one that explains more
   int border_bits = 0;  // as above
   std::filesystem::path out;
@@ -109,8 +112,8 @@ absl::Status MarkersCommand(const MarkersArguments& arguments);
 absl::Status MarkersRenderCommand(const MarkersArguments& arguments);
 /// Sheets of markers to be printed: what `saccade markers print` becomes.
 absl::Status PrintMarkersCommand(const PrintMarkersArguments& arguments);
-/// Finds a lens from the pictures of a folder that show a board or a sheet of tags, and writes it
-/// as camera.yaml.
+/// Finds a lens from the pictures of a folder or a source that show a board or a sheet of tags, and
+/// writes it as camera.yaml.
 absl::Status CalibrateTargetCommand(const CalibrateTargetArguments& arguments);
 /// Whether the source is paced by the world, and ends when somebody ends it.
 bool IsLive(absl::string_view uri);

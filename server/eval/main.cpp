@@ -57,6 +57,11 @@ void AddRun(CLI::App& app, RunArguments& arguments) {
   run->add_option("--fps", arguments.fps, "Pictures a second, where there are no time stamps")
       ->check(CLI::Range(0.1, 1000.0))
       ->check(Finite());
+  run->add_option("--fov", arguments.view_deg,
+                  "Degrees that the lens is taken to see across, whatever camera.yaml says; it is "
+                  "learnt while tracking")
+      ->check(CLI::Range(10.0, 150.0))
+      ->check(Finite());
   run->add_option("--out", arguments.out, "Folder for trajectory.tum, frames.csv and report.json")
       ->required();
   run->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
@@ -164,10 +169,23 @@ void AddCalibrateCamera(CLI::App& app, CalibrateArguments& arguments) {
 void AddCalibrateTarget(CLI::App& app, CalibrateTargetArguments& arguments) {
   CLI::App* calibrate =
       app.add_subcommand("calibrate", "Find a camera's lens from pictures of a target");
-  calibrate->add_option("--images", arguments.images, "Folder of pictures")->required();
+  CLI::Option* images = calibrate->add_option("--images", arguments.images, "Folder of pictures");
+  calibrate
+      ->add_option("--source", arguments.source,
+                   "Instead: v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or "
+                   "sim:desk[?key=value&...]")
+      ->excludes(images);
+  calibrate->add_option("--frames", arguments.frames,
+                        "Half-open range A:B of the source's frames, from zero");
+  calibrate->add_option("--for", arguments.seconds, "End the source after so many seconds")
+      ->check(CLI::Range(0.01, 1e6))
+      ->check(Finite());
   calibrate->add_option("--target", arguments.target,
-                        "chessboard:9x6:0.04, aprilgrid:6x6:0.088:0.3 or aprilgrid:FILE.yaml; else "
-                        "the folder's aprilgrid.yaml");
+                        "chessboard:9x6:0.04 (inner corners, side of a square in metres), "
+                        "charuco:7x5:0.04:0.03[:aruco_4x4_50] (squares, sides of a square and of a "
+                        "marker), aprilgrid:6x6:0.088:0.3, aprilgrid:FILE.yaml or walls:FILE.yaml "
+                        "(squares of known places on two walls, one view is enough); else the "
+                        "folder's aprilgrid.yaml");
   calibrate
       ->add_option("--lens", arguments.lens,
                    "Model; else the one that explains the pictures better")

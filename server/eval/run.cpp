@@ -15,7 +15,8 @@ constexpr Timestamp kProgressEvery_ns = 10'000'000'000;
 
 absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const TrackFunction& track,
                                                   const Trajectory& truth,
-                                                  const std::filesystem::path& folder) {
+                                                  const std::filesystem::path& folder,
+                                                  const ReportMore& more) {
   absl::StatusOr<RunRecorder> recorder = RunRecorder::Create(folder);
   if (!recorder.ok()) return recorder.status();
   Timestamp told = MonotonicNow();
@@ -48,6 +49,7 @@ absl::StatusOr<nlohmann::ordered_json> RunTracker(FrameSource& source, const Tra
     const auto interval_ns = static_cast<Timestamp>(1e9 / source.info().camera->intrinsics().fps);
     AddScores(Associate(recorder->trajectory(), truth, interval_ns), metric, report);
   }
+  if (more) more(report);
   const absl::Status written = WriteFileAtomically(folder / "report.json", report.dump(2) + "\n");
   if (!written.ok()) return written;
   return report;

@@ -119,12 +119,10 @@ Grid Oriented(const Grid& found, const CameraModel& camera, const ChessboardTarg
   return best;
 }
 
-}  // namespace
-
-absl::StatusOr<TargetObservation> DetectChessboard(const ImagePyramid& pyramid,
-                                                   const CameraModel& camera,
-                                                   const ChessboardTarget& target,
-                                                   const std::optional<Rigid3>& predicted) {
+/// Corners, ordered, and the points that they are.
+absl::StatusOr<TargetObservation> SeeCorners(const ImagePyramid& pyramid, const CameraModel& camera,
+                                             const ChessboardTarget& target,
+                                             const std::optional<Rigid3>& predicted) {
   if (absl::Status status = Check(pyramid, target); !status.ok()) return status;
   const cv::Size size(target.columns, target.rows);
   Grid corners = FindCorners(pyramid, size);
@@ -145,6 +143,18 @@ absl::StatusOr<TargetObservation> DetectChessboard(const ImagePyramid& pyramid,
     seen.points_in_world.emplace_back((k % target.columns) * target.square_m,
                                       (k / target.columns) * target.square_m, 0.0);
   }
+  return seen;
+}
+
+}  // namespace
+
+absl::StatusOr<TargetObservation> DetectChessboard(const ImagePyramid& pyramid,
+                                                   const CameraModel& camera,
+                                                   const ChessboardTarget& target,
+                                                   const std::optional<Rigid3>& predicted) {
+  absl::StatusOr<TargetObservation> corners = SeeCorners(pyramid, camera, target, predicted);
+  if (!corners.ok()) return corners;
+  TargetObservation& seen = *corners;
   const auto fits =
       FitPlanarPose(camera, seen.points_in_world, seen.pixels, {.sigma_px = 0.2, .huber_px = 2.0});
   if (!fits.ok()) return fits.status();
@@ -165,6 +175,20 @@ absl::StatusOr<TargetObservation> DetectChessboard(const ImagePyramid& pyramid,
   seen.world_from_camera = chosen->world_from_camera;
   seen.pose_covariance = chosen->covariance;
   seen.rms_px = chosen->rms_px;
+  return corners;
+}
+
+absl::StatusOr<TargetObservation> SeeChessboard(const ImagePyramid& pyramid,
+                                                const CameraModel& camera,
+                                                const ChessboardTarget& target) {
+  constexpr double kHuber_px = 20.0;  // distortion that the lens lacks bends the board
+  absl::StatusOr<TargetObservation> seen = SeeCorners(pyramid, camera, target, std::nullopt);
+  if (!seen.ok()) return seen;
+  const auto fits = FitPlanarPose(camera, seen->points_in_world, seen->pixels,
+                                  {.sigma_px = 0.2, .huber_px = kHuber_px});
+  if (!fits.ok()) return fits.status();
+  seen->world_from_camera = fits->front().world_from_camera;
+  seen->rms_px = fits->front().rms_px;
   return seen;
 }
 

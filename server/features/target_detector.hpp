@@ -39,6 +39,12 @@ absl::StatusOr<TargetObservation> DetectChessboard(const ImagePyramid& pyramid,
                                                    const ChessboardTarget& target,
                                                    const std::optional<Rigid3>& predicted);
 
+/// The same without a judgement of the lens, which may be far from right: corners and the points
+/// that they are, in one of the two orders that look alike, and about where the camera is.
+absl::StatusOr<TargetObservation> SeeChessboard(const ImagePyramid& pyramid,
+                                                const CameraModel& camera,
+                                                const ChessboardTarget& target);
+
 struct PatchTargetOptions {
   /// Best score a patch needs: NSSD, as in SearchOptions.
   double max_nssd = 0.40;

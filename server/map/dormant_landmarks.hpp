@@ -61,6 +61,10 @@ class DormantLandmarks {
   DormantLandmark Take(FeatureId id);
   /// The map was moved: how well each is known goes along.
   void Move(const std::function<Similarity3(FeatureId)>& world_from_before);
+  /// Their looks, to be changed.
+  void ForEach(const std::function<void(Landmark&)>& change) {
+    for (auto& [id, dormant] : landmarks_) change(dormant.landmark);
+  }
   /// Asks the graph where its landmarks are now: only about those whose keyframe has changed since.
   /// Those that the graph has forgotten go.
   void Locate(const VersionOf& version, const Lookup& lookup);

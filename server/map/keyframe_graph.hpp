@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/map/bundle_adjustment.hpp"
+#include "server/map/lens_adjustment.hpp"
 #include "shared/geometry/similarity3.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
@@ -88,6 +89,22 @@ class KeyframeGraph {
   /// `estimate`: a feature as the filter has it now, if it still does. Nothing while too few points
   /// show parallax: a camera that only turns has nothing to adjust.
   std::optional<Job> MakeJob(const Lookup& estimate) const;
+  /// A problem over the whole graph, or what stands for it, with the lens unknown.
+  struct LensJob {
+    LensBundle problem;
+    std::vector<KeyframeId> keyframes;  // rising
+    std::vector<FeatureId> points;
+  };
+  /// `lens`: what the rays were made with. The lens's guess and prior are left to the caller.
+  LensJob MakeLensJob(const CameraModel& lens, const Lookup& estimate) const;
+  /// How a change of lens moves the rest: rays by `reray`, what the job left out along with what is
+  /// next to it.
+  struct LensChange {
+    std::function<Eigen::Vector3d(const Eigen::Vector3d&)> reray;  // unit to unit
+    double sigma_factor = 1.0;                                     // of angles
+  };
+  /// Takes an adjusted job over, and writes all rays anew.
+  void TakeLens(const LensJob& job, const LensChange& change);
   /// A point as the graph has it, and the pose that it was first seen from.
   struct Recalled {
     KeyframeId anchor = 0;

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -85,6 +86,12 @@ class Map {
   std::optional<KeyframeGraph::Job> MakeJob(const FilterState& filter) const;
   /// Takes an adjusted one over, into the filter as it was at its checkpoint.
   void Take(const KeyframeGraph::Job& job, FilterState& filter);
+  /// The keyframes with the lens unknown; nothing while there are too few.
+  std::optional<KeyframeGraph::LensJob> MakeLensJob(const CameraModel& lens,
+                                                    const FilterState& filter) const;
+  /// Takes an adjusted one over: keyframes, filter and looks are of the lens `after` from here on.
+  void TakeLens(const KeyframeGraph::LensJob& job, const CameraModel& before,
+                const std::shared_ptr<const CameraModel>& after, FilterState& filter);
   /// Moves all of it, and the filter with the newest keyframe (a closed loop). Landmarks that were
   /// woken where the two parts disagree by more than `torn_m` go back to rest.
   void Move(const MapCorrection& correction, double torn_m, FilterState& filter);

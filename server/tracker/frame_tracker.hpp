@@ -24,6 +24,8 @@ class FrameTracker {
                                                 const Rigid3& world_from_camera,
                                                 const Eigen::Vector2d& pixel, double depth_prior_m,
                                                 double depth_sigma_m) = 0;
+  /// The lens of the frame tracked last, where it is learnt; null: that of the frames.
+  virtual std::shared_ptr<const CameraModel> lens() const { return nullptr; }
 };
 
 }  // namespace saccade

@@ -42,6 +42,9 @@ std::shared_ptr<const MapSnapshot> Tracker::Publish(const Frame& frame, const St
   const CameraMotion camera = filter_.WholeMotion();
   const Difficulties difficulties = SeeDifficulties();
   snapshot->advice = AdviceFor(monitor_, difficulties);
+  if (learner_) {
+    if (snapshot->advice.empty()) snapshot->advice = LearningWords(learner_->state());
+  }
   if (difficulties.lens_growth && !lens_told_) Log(snapshot->advice);
   lens_told_ = lens_told_ || difficulties.lens_growth;
   snapshot->metric = metric_;

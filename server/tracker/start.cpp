@@ -19,6 +19,10 @@ constexpr double kAgreeing = 0.75;
 void Tracker::Begin(const Frame& frame) {
   StopWatch watch;
   matches_ = FrameMatches();
+  if (StudiesLens()) {
+    monitor_.WaitForStart();
+    return;
+  }
   const auto start = starter_.Try(*front_end_, filter_, map_.in_use());
   times_.search_ms = watch.Lap_ms();
   if (!start) {

@@ -66,7 +66,11 @@ Tracker::Tracker(const SourceInfo& source, const TrackerOptions& options,
       refiner_(options),
       finder_(options),
       loops_(options, relocaliser_),
-      suspension_(options.suspend_rate_rad_s) {}
+      suspension_(options.suspend_rate_rad_s) {
+  if (source.lens_assumed && options.learn_lens) {
+    learner_ = std::make_unique<LensLearner>(options, source.camera);
+  }
+}
 
 void Tracker::Reset() {
   loops_.Reset();
@@ -80,6 +84,7 @@ void Tracker::Reset() {
   refiner_.Reset();
   finder_.Reset();
   lens_evidence_.ForgetViews();
+  if (learner_) learner_->Reset();
   matches_ = FrameMatches();
   before_relocalisation_.reset();
   started_ = metric_ = held_ = has_frame_ = false;
@@ -103,6 +108,13 @@ bool Tracker::Hopeless() const {
 }
 
 std::shared_ptr<const MapSnapshot> Tracker::Track(const Frame& frame) {
+  if (!learner_ || !frame.camera) return TrackSeen(frame);
+  Frame seen = frame;
+  seen.camera = learner_->lens();
+  return TrackSeen(seen);
+}
+
+std::shared_ptr<const MapSnapshot> Tracker::TrackSeen(const Frame& frame) {
   StopWatch total;
   times_ = StageTimes();
   const double dt = has_frame_ ? Seconds(frame.capture_time_ns - last_frame_.capture_time_ns) : 0.0;
@@ -214,8 +226,9 @@ void Tracker::Follow(const Frame& frame, double dt) {
     Revert();
   } else if (confirmed) {
     before_relocalisation_.reset();
-    if (held_) lens_evidence_.Add(*frame.camera, filter_, matches_);
+    if (held_ && !learner_) lens_evidence_.Add(*frame.camera, filter_, matches_);
     Manage(frame);
+    if (held_ && learner_) LearnLens(frame);
   }
   times_.manage_ms = watch.Lap_ms() - times_.waited_ms;
 }

@@ -16,6 +16,7 @@
 #include "server/tracker/frame_tracker.hpp"
 #include "server/tracker/front_end.hpp"
 #include "server/tracker/lens_evidence.hpp"
+#include "server/tracker/lens_learner.hpp"
 #include "server/tracker/loop_closer.hpp"
 #include "server/tracker/picture_rate.hpp"
 #include "server/tracker/refiner.hpp"
@@ -50,12 +51,23 @@ class Tracker final : public FrameTracker {
   /// if it recognises it. The cost of a frame does not depend on the gap.
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override;
 
+  /// Of a source whose lens is assumed; the frames' own camera is not looked at then.
+  std::shared_ptr<const CameraModel> lens() const override {
+    return learner_ ? learner_->lens() : nullptr;
+  }
+
+  /// What is known of it; nothing: the lens was given.
+  std::optional<LensState> lens_state() const {
+    return learner_ ? std::optional(learner_->state()) : std::nullopt;
+  }
+
   /// Returns when nothing is being computed on other threads (for a process that forks).
   void WaitForBackground() const {
     refiner_.Wait();
     finder_.Wait();
     loops_.Wait();
     lens_evidence_.WaitForFit();
+    if (learner_) learner_->Wait();
   }
 
   /// Throws the map away; the next frame starts anew (with the target, where there is one in view).
@@ -84,6 +96,7 @@ class Tracker final : public FrameTracker {
  private:
   Tracker(const SourceInfo& source, const TrackerOptions& options,
           std::unique_ptr<FrontEnd> front_end);
+  std::shared_ptr<const MapSnapshot> TrackSeen(const Frame& frame);
   void Begin(const Frame& frame);
   /// Lost before there was a map that one could come back to.
   void StartAnew(const Frame& frame);
@@ -119,6 +132,10 @@ class Tracker final : public FrameTracker {
   bool Settled() const;
   /// Without a target, until the pictures hold the scale: tries to find a start, and takes it over.
   void SeekStart(const Frame& frame);
+  /// Whether a target in view is of more use to learn the lens from than to start with.
+  bool StudiesLens();
+  /// Tries to learn the lens; a better one is taken over by map, filter and this frame.
+  void LearnLens(const Frame& frame);
   /// Filter, map and keyframes anew, from a start that holds; the camera from this frame's matches.
   void TakeOver(const FoundStart& start, const Frame& frame);
   std::optional<double> MovedPx(const CameraModel& camera, double dt) const;
@@ -138,6 +155,7 @@ class Tracker final : public FrameTracker {
   Starter starter_;
   StatusMonitor monitor_;
   LensEvidence lens_evidence_{LensEvidenceOptions()};  // the source's, as the rate is
+  std::unique_ptr<LensLearner> learner_;               // null: the lens was given
   bool lens_told_ = false;                             // in the log
   PictureRate rate_;  // the source's: a new map changes nothing about it
   Relocaliser relocaliser_;

@@ -35,6 +35,8 @@ const OptionTable<TrackerOptions>& Table() {
        "wait until pictures hold the scale; false: until some depths are known"},
       {"start_scale_sigma", &O::start_scale_sigma, 1e-3, 10,
        "relative, of distances gone against distances seen"},
+      {"learn_lens", &O::learn_lens, 0, 1,
+       "of a camera without camera.yaml: learnt while it is tracked"},
       {"adjust", &O::adjust, 0, 1, "bundle adjustment on another core"},
       {"adjust_delay", &O::adjust_delay, 1, 1000,
        "frames from its start until its result is taken"},

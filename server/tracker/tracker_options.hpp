@@ -71,6 +71,8 @@ struct TrackerOptions {
 
   // Start without a target.
   bool start = true;  // wait until pictures hold the scale; false: as soon as some depths are known
+  /// A lens that nobody measured is learnt while it is tracked; false: it stays as it is assumed.
+  bool learn_lens = true;
   double start_scale_sigma = 0.05;  // relative, of distances gone against distances seen
 
   // Bundle adjustment on another core.

@@ -33,10 +33,16 @@ Wearable::Wearable(const SourceInfo& source, std::unique_ptr<FrameTracker> track
 
 const WearableStep& Wearable::Step(Frame frame) {
   WearableStep step;
+  if (auto lens = tracker_->lens(); lens && frame.camera) frame.camera = std::move(lens);
   step.frame = std::make_shared<const Frame>(std::move(frame));
   CostMeter meter;
   step.snapshot = tracker_->Track(*step.frame);
   step.cost = meter.Read(step.snapshot->stage_ms.waited_ms);
+  if (auto lens = tracker_->lens(); lens && step.frame->camera != lens) {  // learnt with this frame
+    Frame seen = *step.frame;
+    seen.camera = std::move(lens);
+    step.frame = std::make_shared<const Frame>(std::move(seen));
+  }
   ring_.Push({step.frame, step.snapshot});
   pointers_->OnSnapshot(step.snapshot);
   step.moved = book_->OnSnapshot(step.snapshot, *step.frame->camera);

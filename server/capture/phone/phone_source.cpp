@@ -75,8 +75,9 @@ absl::StatusOr<std::unique_ptr<PhoneSource>> PhoneSource::Open(absl::string_view
   cv::Size size = asked->value_or(cv::Size(640, 480));
   CameraIntrinsics lens = AssumedLens(size, size.height > size.width, fps);
   if (options.camera_file.empty()) {
-    info.remark = kAssumedLensWords;
-    Log(absl::StrCat("source ", info.uri, ": ", kAssumedLensWords));
+    info.remark = AssumedLensWords();
+    info.lens_assumed = true;
+    Log(absl::StrCat("source ", info.uri, ": ", AssumedLensWords()));
   } else {
     const absl::StatusOr<CameraIntrinsics> read =
         LoadCamera(options.camera_file, [&] { return *asked; });

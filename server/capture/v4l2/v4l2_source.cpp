@@ -262,8 +262,9 @@ absl::StatusOr<std::unique_ptr<CameraSource>> OpenV4l2(absl::string_view rest,
   info.uri = absl::StrCat("v4l2:", rest);
   if (!lens) {
     lens = AssumedLens(size, swaps, (*camera)->fps());
-    info.remark = kAssumedLensWords;
-    Log(absl::StrCat("camera ", request->device, ": ", kAssumedLensWords));
+    info.remark = AssumedLensWords();
+    info.lens_assumed = true;
+    Log(absl::StrCat("camera ", request->device, ": ", AssumedLensWords()));
   } else if (lens->width != size.width || lens->height != size.height) {
     return absl::InvalidArgumentError(
         absl::StrCat(options.camera_file.string(), ": is of pictures of ", lens->width, "x",

@@ -48,8 +48,9 @@ absl::StatusOr<std::unique_ptr<VideoSource>> Open(VideoRequest request, std::str
   info.uri = std::move(uri);
   CameraIntrinsics lens = AssumedLens(size, request.turn.swaps_sides(), decoder->info.fps);
   if (options.camera_file.empty()) {
-    info.remark = kAssumedLensWords;
-    Log(absl::StrCat("source ", info.uri, ": ", kAssumedLensWords));
+    info.remark = AssumedLensWords();
+    info.lens_assumed = true;
+    Log(absl::StrCat("source ", info.uri, ": ", AssumedLensWords()));
   } else {
     const absl::StatusOr<CameraIntrinsics> read =
         LoadCamera(options.camera_file, [&] { return std::optional(size); });

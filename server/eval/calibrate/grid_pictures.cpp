@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "server/eval/markers/picture_folder.hpp"
-
 namespace saccade {
 namespace {
 
@@ -35,14 +33,14 @@ BoardView ViewOf(std::size_t number, const std::vector<MarkerSighting>& sighting
 
 }  // namespace
 
-int BorderBitsOf(const std::vector<std::filesystem::path>& files, const TagGrid& grid) {
+int BorderBitsOf(const PictureSet& pictures, const TagGrid& grid) {
   int most = 0, best = 2;
   for (const int bits : {2, 1}) {
     auto detector = MakeMarkerDetector("apriltag", {{grid.family}, bits});
     if (!detector.ok()) continue;
     int read = 0;
-    for (std::size_t k = 0; k < std::min(files.size(), kFirstPictures); ++k) {
-      const absl::StatusOr<cv::Mat> grey = LoadGrey(files[k]);
+    for (std::size_t k = 0; k < std::min(pictures.size(), kFirstPictures); ++k) {
+      const absl::StatusOr<cv::Mat> grey = pictures.load(k);
       if (grey.ok()) read += static_cast<int>((*detector)->Detect(*grey).size());
     }
     if (read > most) best = bits;
@@ -51,18 +49,38 @@ int BorderBitsOf(const std::vector<std::filesystem::path>& files, const TagGrid&
   return best;
 }
 
-absl::Status GridPictures::Read(const std::filesystem::path& file,
-                                const std::vector<std::unique_ptr<MarkerDetector>>& detectors) {
-  const absl::StatusOr<cv::Mat> grey = LoadGrey(file);
+absl::StatusOr<GridPictures> GridPictures::Read(PictureSet set, const TagGrid& grid,
+                                                int border_bits, const std::string& first,
+                                                Progress progress, const LeftOut& left_out) {
+  const int border = border_bits > 0 ? border_bits : BorderBitsOf(set, grid);
+  absl::StatusOr<TagFamily> family = TagFamily::Make(grid.family, border);
+  if (!family.ok()) return family.status();
+  std::vector<std::unique_ptr<MarkerDetector>> detectors;
+  for (const std::string& name : {first, std::string(first == "aruco" ? "apriltag" : "aruco")}) {
+    auto detector = MakeMarkerDetector(name, {{grid.family}, border});
+    if (!detector.ok()) return detector.status();
+    detectors.push_back(*std::move(detector));
+  }
+  GridPictures pictures(std::move(set), grid, *std::move(family), std::move(progress));
+  for (std::size_t k = 0; k < pictures.set_.size(); ++k) {
+    if (absl::Status read = pictures.ReadOne(k, detectors); !read.ok()) left_out(read);
+    pictures.progress_("reading", k + 1, pictures.set_.size());
+  }
+  return pictures;
+}
+
+absl::Status GridPictures::ReadOne(std::size_t number,
+                                   const std::vector<std::unique_ptr<MarkerDetector>>& detectors) {
+  const absl::StatusOr<cv::Mat> grey = set_.load(number);
   if (!grey.ok()) return grey.status();
   if (size_.empty()) size_ = grey->size();
   if (grey->size() != size_) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(file.string(), ": is ", grey->cols, " x ", grey->rows, ", the others are ",
-                     size_.width, " x ", size_.height, "; give one camera's pictures"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        set_.names[number], ": is ", grey->cols, " x ", grey->rows, ", the others are ",
+        size_.width, " x ", size_.height, "; give one camera's pictures"));
   }
   GridPicture picture;
-  picture.file = file;
+  picture.number = number;
   for (const std::unique_ptr<MarkerDetector>& detector : detectors) {
     for (MarkerSighting& sighting : detector->Detect(*grey)) {
       const auto same = [&](const MarkerSighting& other) {
@@ -103,7 +121,7 @@ std::vector<BoardView> GridPictures::Views() const {
 absl::Status GridPictures::Find(const CameraModel& camera) {
   for (std::size_t k = 0; k < pictures_.size(); ++k) {
     GridPicture& picture = pictures_[k];
-    const absl::StatusOr<cv::Mat> grey = LoadGrey(picture.file);
+    const absl::StatusOr<cv::Mat> grey = set_.load(picture.number);
     if (!grey.ok()) return grey.status();
     // From what was found before, where there is that: it was checked against the lens already.
     const std::optional<GridView> found = SearchGrid(

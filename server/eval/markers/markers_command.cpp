@@ -101,35 +101,23 @@ absl::Status DetectEach(const std::vector<std::filesystem::path>& files, MarkerD
 }
 
 /// With what is known of the sheet: the second step.
-absl::Status DetectGrid(const std::vector<std::filesystem::path>& files, const TagGrid& grid,
-                        const MarkersArguments& arguments, OutputFile& out, Tally& tally) {
-  const int border = arguments.border_bits > 0 ? arguments.border_bits : BorderBitsOf(files, grid);
-  absl::StatusOr<TagFamily> family = TagFamily::Make(grid.family, border);
-  if (!family.ok()) return family.status();
-  std::vector<std::unique_ptr<MarkerDetector>> detectors;
-  // The named one first; the other reads what it misses.
-  for (const std::string& name :
-       {arguments.detector, std::string(arguments.detector == "aruco" ? "apriltag" : "aruco")}) {
-    auto detector = MakeMarkerDetector(name, {{grid.family}, border});
-    if (!detector.ok()) return detector.status();
-    detectors.push_back(*std::move(detector));
-  }
-  GridPictures pictures(grid, *std::move(family), SayProgress);
-  for (std::size_t k = 0; k < files.size(); ++k) {
-    if (absl::Status read = pictures.Read(files[k], detectors); !read.ok()) {
-      SayUnreadable(read, tally);
-    }
-    SayProgress("reading", k + 1, files.size());
-  }
-  const absl::StatusOr<LensFit> fit = pictures.Search(LensModel::kBrownConrady);
+absl::Status DetectGrid(const TagGrid& grid, const MarkersArguments& arguments, OutputFile& out,
+                        Tally& tally) {
+  const absl::StatusOr<PictureSet> set = PicturesOfFolder(arguments.images);
+  if (!set.ok()) return set.status();
+  absl::StatusOr<GridPictures> pictures =
+      GridPictures::Read(*set, grid, arguments.border_bits, arguments.detector, SayProgress,
+                         [&](const absl::Status& why) { SayUnreadable(why, tally); });
+  if (!pictures.ok()) return pictures.status();
+  const absl::StatusOr<LensFit> fit = pictures->Search(LensModel::kBrownConrady);
   if (!fit.ok()) {
     std::cerr << "the sheet was not searched for: " << fit.status().message() << "\n";
   }
-  for (const GridPicture& picture : pictures.pictures()) {
+  for (const GridPicture& picture : pictures->pictures()) {
     const std::vector<MarkerSighting>& sightings =
         picture.found ? picture.found->sightings : picture.read;
     for (const MarkerSighting& sighting : sightings)
-      out.Write(SightingRow(picture.file.filename().string(), sighting));
+      out.Write(SightingRow(set->names[picture.number], sighting));
     Count(sightings, tally);
   }
   return out.status();
@@ -158,7 +146,7 @@ absl::Status MarkersCommand(const MarkersArguments& arguments) {
   if (!out.ok()) return out.status();
   out->Write(kSightingHeader);
   Tally tally;
-  const absl::Status done = *grid ? DetectGrid(*files, **grid, arguments, *out, tally)
+  const absl::Status done = *grid ? DetectGrid(**grid, arguments, *out, tally)
                                   : DetectEach(*files, **detector, *out, tally);
   if (!done.ok()) return done;
   if (absl::Status closed = out->Close(); !closed.ok()) return closed;

@@ -149,6 +149,26 @@ TEST_F(Dataset, MissingPartsAreNamed) {
   EXPECT_THAT(Error(), AllOf(HasSubstr("mav0/cam0/data.csv"), HasSubstr("EuRoC")));
 }
 
+TEST_F(Dataset, ALensMayBeAssumedWhereItIsAskedFor) {
+  EXPECT_FALSE(Open()->info().lens_assumed);
+  SourceOptions wide;
+  wide.view_deg = 90;
+  const auto told = OpenDataset(folder_, wide);
+  ASSERT_TRUE(told.ok()) << told.status();
+  EXPECT_TRUE((*told)->info().lens_assumed);
+  EXPECT_NEAR((*told)->info().camera->intrinsics().fx, 32.0, 1e-9);  // 64 px across
+  EXPECT_THAT((*told)->info().remark, HasSubstr("90 deg"));
+  std::filesystem::remove(folder_ / "camera.yaml");
+  EXPECT_THAT(Error(), HasSubstr("camera.yaml"));
+  SourceOptions missing;
+  missing.lens_may_be_missing = true;
+  const auto assumed = OpenDataset(folder_, missing);
+  ASSERT_TRUE(assumed.ok()) << assumed.status();
+  EXPECT_TRUE((*assumed)->info().lens_assumed);
+  EXPECT_NEAR((*assumed)->info().camera->intrinsics().fx, 55.426, 1e-3);
+  EXPECT_NEAR((*assumed)->info().camera->intrinsics().fps, 100.0, 1e-6);
+}
+
 TEST_F(Dataset, NothingDecodableIsDataLoss) {
   for (int i = 0; i < kFrames; ++i) std::filesystem::remove(PicturePath(i));
   const auto source = OpenDataset(folder_, {});
