@@ -19,7 +19,7 @@ constexpr double kFacing = 0.17;       // cosine: a square seen more aslant has 
 constexpr double kShortest_px = 14.0;  // side that is searched
 constexpr double kBorder_px = 4.0;
 constexpr double kCornerNoise_px = 0.05;  // beyond the fits: print and lens
-constexpr int kHiddenLines = 1;  // with no more lines than this something is before the square
+constexpr int kHiddenLines = 2;  // with no more sides than this something is before the square
 constexpr double kFirstPosition_m = 0.02, kFirstAngle_rad = 0.01;  // beyond what the detector says
 
 }  // namespace
@@ -145,7 +145,7 @@ void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
   for (const Eigen::Matrix2d& spread : guess.covariances) {
     searched_px2_ += M_PI * 9.0 * std::sqrt(std::max(0.0, spread.determinant()));
   }
-  // Its sides are nowhere: something stands before it, which is no failure of the square's.
+  // Something stands before it, which is no failure of the square's.
   if (search.lines <= kHiddenLines) return;
   int agreeing = 0;
   for (int c = 0; c < 4; ++c) {

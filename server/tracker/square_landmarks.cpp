@@ -14,8 +14,8 @@ constexpr int kLookEvery = 5;            // frames, when nothing is missing
 constexpr double kFacing = 0.17;         // cosine; see LandmarkTracker
 constexpr double kShortest_px = 14.0;
 constexpr double kBorder_px = 4.0;
-constexpr int kHiddenLines = 1;
-constexpr double kSigma_px = 0.25;       // of a corner beyond its fits: lens, print, shutter
+constexpr int kHiddenLines = 2;     // with no more sides than this something is before the square
+constexpr double kSigma_px = 0.25;  // of a corner beyond its fits: lens, print, shutter
 constexpr double kLeastSpread_px = 1.0;  // of where a corner is expected
 constexpr double kMostSpread_px = 6.0;
 constexpr double kGate_sigmas = 4.0;
@@ -139,7 +139,7 @@ void SquareLandmarks::SearchOne(const Frame& frame, const Rigid3& pose, const Ma
   }
   if (longest < kShortest_px) return;
   const SquareSearch search = SearchSquareTwice(frame.grey, camera, guess);
-  if (search.lines <= kHiddenLines) return;  // something stands before it
+  if (search.lines <= kHiddenLines) return;
   std::vector<Observation> own;
   for (int c = 0; c < 4; ++c) {
     ++attempted_;

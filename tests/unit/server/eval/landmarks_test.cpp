@@ -16,9 +16,9 @@ class HallOfSquares : public ::testing::Test {
  protected:
   void SetUp() override {
     HallOptions options;
-    options.width = 512;
-    options.height = 384;
-    options.fps = 15;
+    options.width = 640;
+    options.height = 480;
+    options.fps = 12.5;
     options.duration_s = 13.0;
     auto made = SquaresSource::Create(options);
     ASSERT_TRUE(made.ok()) << made.status();
@@ -54,7 +54,7 @@ TEST_F(HallOfSquares, KollersTrackerHoldsWithHalfOfThemCoveredAndComesBackT23) {
                             source_->WorldFromCamera((*frame)->id).translation)
                                .norm();
     tracked += good ? 1 : 0;
-    wrong += good && error_m > 0.02 ? 1 : 0;
+    wrong += good && error_m > 0.03 ? 1 : 0;
     if (SquaresSource::kHalf.Holds(t)) {
       ++half;
       half_tracked += good ? 1 : 0;
@@ -71,13 +71,13 @@ TEST_F(HallOfSquares, KollersTrackerHoldsWithHalfOfThemCoveredAndComesBackT23) {
       attempted += feature.state != FeatureState::kNotAttempted ? 1 : 0;
     }
   }
-  EXPECT_GT(tracked, 150);
+  EXPECT_GT(tracked, 120);
   EXPECT_EQ(wrong, 0);
   EXPECT_EQ(half_tracked, half);
   ASSERT_TRUE(back_s);
   EXPECT_LT(*back_s, 0.5);
-  EXPECT_GT(covered, 500);
-  EXPECT_LT(attempted, covered / 100);  // a hidden square counts no failed attempt
+  EXPECT_GT(covered, 400);
+  EXPECT_LT(attempted, covered / 50);  // a hidden square counts no failed attempt
 }
 
 TEST_F(HallOfSquares, KollersTrackerRefusesWhatItCannotUse) {
