@@ -19,6 +19,7 @@
 #include "server/gaze/gaze_options.hpp"
 #include "server/mount/drivers/drivers.hpp"
 #include "server/pipeline/peer_address.hpp"
+#include "server/tracker/landmark_options.hpp"
 #include "server/tracker/tracker_options.hpp"
 #include "shared/io/toml_file.hpp"
 #include "shared/version/version.hpp"
@@ -155,8 +156,8 @@ std::string DefaultFile() {
   absl::StrAppend(&text, "\n[video]\n");
   add("bit_rate_bit_s = 0", BitRateWords());
   absl::StrAppend(&text, "\n", LimitSettings::Describe(), "\n", DescribeOidc(), "\n",
-                  TrackerOptions::Describe(), "\n", GazeOptions::Describe(), "\n",
-                  MountDrivers().Describe());
+                  TrackerOptions::Describe(), "\n", LandmarkOptions::Describe(), "\n",
+                  GazeOptions::Describe(), "\n", MountDrivers().Describe());
   return text;
 }
 
@@ -223,8 +224,8 @@ absl::Status ReadFile(const CLI::App& app, Raw& raw) {
       }
       left.erase("client_roles");
     }
-    // Read by TrackerOptions, GazeOptions, LimitSettings, LoadOidc and the mounts.
-    for (const char* table : {"tracker", "gaze", "limits", "oidc"}) left.erase(table);
+    // Read by TrackerOptions, LandmarkOptions, GazeOptions, LimitSettings, LoadOidc and the mounts.
+    for (const char* table : {"tracker", "landmarks", "gaze", "limits", "oidc"}) left.erase(table);
     for (const std::string& table : MountDrivers().Tables()) left.erase(table);
     if (!left.empty()) return Bad(absl::StrCat(raw.config, ": unknown key ", *left.begin()));
   } catch (const std::exception& error) {

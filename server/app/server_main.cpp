@@ -23,7 +23,7 @@
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
 #include "server/store/annotation_store.hpp"
-#include "server/tracker/tracker.hpp"
+#include "server/tracker/make_tracker.hpp"
 #include "server/wear/wearer_entrance.hpp"
 #include "shared/io/log.hpp"
 #include "shared/io/regular_file.hpp"
@@ -81,7 +81,13 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, E
     if (!loaded.ok()) return loaded;
     if (absl::Status gaze = options.gaze.LoadToml(config.config_file); !gaze.ok()) return gaze;
   }
-  absl::StatusOr<std::unique_ptr<Tracker>> tracker = Tracker::Create(info, tracker_options);
+  LandmarkOptions landmarks;
+  landmarks.live = true;
+  if (!config.config_file.empty()) {
+    if (absl::Status read = landmarks.LoadToml(config.config_file); !read.ok()) return read;
+  }
+  absl::StatusOr<std::unique_ptr<FrameTracker>> tracker =
+      MakeFrameTracker(info, tracker_options, landmarks);
   if (!tracker.ok()) return tracker.status();
   shutdown.SetPhase("opening the data base");
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store = AnnotationStore::Open(config.data_dir);

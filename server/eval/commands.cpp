@@ -104,7 +104,12 @@ absl::Status RunCommand(const RunArguments& arguments) {
     if (!loaded.ok()) return loaded.status();
     truth = *std::move(loaded);
   }
-  const auto tracker = MakeTracker(source->info(), arguments.tracker);
+  // A map of squares beside the pictures is used, unless another is named: a later --set wins.
+  TrackerArguments setup = arguments.tracker;
+  if (const auto squares = arguments.dataset / "landmarks.toml"; MayExist(squares)) {
+    setup.set.insert(setup.set.begin(), absl::StrCat("landmarks.file=", squares.string()));
+  }
+  const auto tracker = MakeFrameTracker(source->info(), setup);
   if (!tracker.ok()) return tracker.status();
   LensCourse course;
   const auto report = RunTracker(

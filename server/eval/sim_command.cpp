@@ -7,6 +7,7 @@
 #include "server/eval/commands.hpp"
 #include "server/eval/forms_scenario.hpp"
 #include "server/eval/gaze_scenario.hpp"
+#include "server/eval/landmarks/landmarks_scenario.hpp"
 #include "server/eval/loop_scenario.hpp"
 #include "server/eval/pixel_run.hpp"
 #include "server/eval/points_scenario.hpp"
@@ -140,6 +141,7 @@ std::string Table(const Json& report) {
 }
 
 double DefaultDuration_s(absl::string_view scenario) {
+  if (IsLandmarksScenario(scenario)) return LandmarksDuration_s(scenario);
   if (scenario == "soak" || scenario == "passerby") return 610;
   return scenario == "reloc" ? 30 : 60;
 }
@@ -149,7 +151,7 @@ double DefaultDuration_s(absl::string_view scenario) {
 std::string ScenarioNames() {
   std::string names = "points, forms, soak, passerby, reloc, loop";
   for (const PixelScenario& each : kPixelScenarios) absl::StrAppend(&names, ", ", each.name);
-  absl::StrAppend(&names, ", ", GazeScenarioNames());
+  absl::StrAppend(&names, ", ", LandmarksScenarioNames(), ", ", GazeScenarioNames());
   return names;
 }
 
@@ -167,6 +169,7 @@ absl::Status SimCommand(const SimArguments& asked) {
   }
   if (arguments.scenario == "loop") report = RunLoopScenario(arguments);
   if (arguments.scenario == "reloc") report = RunRelocScenario(arguments);
+  if (IsLandmarksScenario(arguments.scenario)) report = RunLandmarksScenario(arguments);
   if (IsGazeScenario(arguments.scenario)) report = RunGazeScenario(arguments);
   for (const PixelScenario& each : kPixelScenarios) {
     if (each.name == arguments.scenario) report = RunPixels(arguments, each.motion);

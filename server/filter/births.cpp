@@ -42,6 +42,13 @@ CloneId FilterState::AddClone(const Rigid3& world_from_camera, const Matrix6d& c
   return next_clone_++;
 }
 
+CloneId FilterState::AddMarker(const Rigid3& world_from_marker, const Matrix6d& covariance,
+                               RobotId robot) {
+  const CloneId id = AddClone(world_from_marker, covariance, robot);
+  clones_.back().users = 1;  // no feature's: Remove() leaves it
+  return id;
+}
+
 absl::Status FilterState::AddFeature(CloneId clone, const FeatureBirth& birth) {
   const auto at = std::ranges::lower_bound(clones_, clone, {}, &Clone::id);
   if (at == clones_.end() || at->id != clone) {

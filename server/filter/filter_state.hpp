@@ -94,6 +94,12 @@ class FilterState {
   /// island of `robot`.
   CloneId AddClone(const Rigid3& world_from_camera, const Matrix6d& covariance,
                    RobotId robot = kFirstRobot);
+  /// Puts the pose of a thing into the state that was given a place elsewhere, with an error of its
+  /// own, as above; it stays until Reset() or Seed(). Its own points are observed as
+  /// Observation::marker says. For a place that comes from the same pictures `covariance` should be
+  /// wide: the first update ties it to the camera (slam-spec 6, 7).
+  CloneId AddMarker(const Rigid3& world_from_marker, const Matrix6d& covariance,
+                    RobotId robot = kFirstRobot);
   /// Starts a feature in a clone. InvalidArgument: unknown clone, id taken, numbers not usable.
   absl::Status AddFeature(CloneId clone, const FeatureBirth& birth);
   /// What is known of where a feature can be, whatever its range; nothing if it is not there. For a
@@ -267,6 +273,10 @@ class FilterState {
                                               const Rigid3& linearisation,
                                               const Eigen::VectorXd& step, Linearised::Rows& rows,
                                               Eigen::Vector2d& ahead) const;
+  /// The same for a point of a marker.
+  std::optional<PixelPrediction> LineariseMarker(
+      const CameraModel& camera, const Observation& observation, const Rigid3& linearisation,
+      const Eigen::VectorXd& step, Linearised::Rows& rows, Eigen::Vector2d& ahead) const;
   /// From the estimates to where they are linearised: the camera at `linearisation`, everything
   /// else where the filter expects it then.
   Eigen::VectorXd StepTo(const Rigid3& linearisation, const Robot& robot) const;

@@ -31,6 +31,8 @@ struct FeatureBirth {
 struct Observation {
   FeatureId id = 0;
   std::optional<Eigen::Vector3d> known_point;  // [m, world]; then `id` is not looked at
+  /// Of a marker (AddMarker): then known_point is in its frame; 0: in world.
+  CloneId marker = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   Eigen::Matrix2d noise = Eigen::Matrix2d::Identity();  // R [px^2]
   /// d pixel / d read-out time [px/s]; `pixel` is corrected with the filter's present read-out.

@@ -25,10 +25,16 @@ absl::Status FilterState::JoinSeen(std::span<const Observation> observations, Ro
   if (!HasRobot(id)) return absl::InvalidArgumentError(absl::StrCat("filter: no robot ", id));
   for (const Observation& seen : observations) {
     if (!seen.known_point && !Has(seen.id)) return NotInView(seen.id);
+    if (seen.known_point && seen.marker != 0 && FindClone(seen.marker) == nullptr) {
+      return absl::InvalidArgumentError(absl::StrCat("filter: no marker ", seen.marker));
+    }
   }
   const BlockId robot = Of(id).block;
   for (const Observation& seen : observations) {
     if (!seen.known_point) Join(IslandOf(robot), IslandOf(Find(seen.id)->block));
+    if (seen.known_point && seen.marker != 0) {
+      Join(IslandOf(robot), IslandOf(FindClone(seen.marker)->block));
+    }
   }
   return absl::OkStatus();
 }
@@ -84,6 +90,22 @@ std::optional<PixelPrediction> FilterState::LineariseOne(
   return at;
 }
 
+std::optional<PixelPrediction> FilterState::LineariseMarker(
+    const CameraModel& camera, const Observation& observation, const Rigid3& linearisation,
+    const VectorXd& step, Linearised::Rows& rows, Eigen::Vector2d& ahead) const {
+  const Clone& marker = *FindClone(observation.marker);
+  rows.clone = rows.point = At(marker.block);
+  const Rigid3 moved = PlusPose(marker.pose, step.segment<6>(rows.clone));
+  auto at = PredictFixed(camera, linearisation, moved * *observation.known_point);
+  if (!at) return at;
+  // The point moves as its marker does, the other way than the camera.
+  const Eigen::Matrix<double, 2, 3> d_point = -at->d_camera.leftCols<3>();
+  at->d_clone << d_point, -d_point * moved.RotationMatrix() * Skew(*observation.known_point) *
+                              RightJacobianSo3(step.segment<3>(rows.clone + 3));
+  ahead = at->d_clone * step.segment<6>(rows.clone);
+  return at;
+}
+
 absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
     const CameraModel& camera, std::span<const Observation> observations,
     const Rigid3& linearisation, const VectorXd& step, const Robot& robot) const {
@@ -101,15 +123,17 @@ absl::StatusOr<FilterState::Linearised> FilterState::LineariseAll(
     rows.readout = all.readout;
     rows.d_readout = observation.d_readout;
     Eigen::Vector2d ahead = Eigen::Vector2d::Zero();
+    const bool fixed = observation.known_point.has_value();
+    const bool of_marker = fixed && observation.marker != 0;
     const auto at =
-        observation.known_point
-            ? PredictFixed(camera, linearisation, *observation.known_point)
-            : LineariseOne(camera, *Find(observation.id), linearisation, step, rows, ahead);
+        of_marker ? LineariseMarker(camera, observation, linearisation, step, rows, ahead)
+        : fixed   ? PredictFixed(camera, linearisation, *observation.known_point)
+                  : LineariseOne(camera, *Find(observation.id), linearisation, step, rows, ahead);
     if (!at) return NotInView(observation.id);
     rows.d_camera = at->d_camera;
     rows.d_camera.rightCols<3>() = at->d_camera.rightCols<3>() * turn;
     rows.d_clone = at->d_clone;
-    rows.d_point = form_->InState(at->d_point);
+    rows.d_point = of_marker ? PointColumns(2, 0) : PointColumns(form_->InState(at->d_point));
     if (all.readout >= 0) ahead += rows.d_readout * step[all.readout];
     all.innovation.segment<2>(2 * static_cast<Eigen::Index>(k)) =
         observation.pixel - at->pixel + rows.d_camera * step.segment<6>(all.camera) + ahead;

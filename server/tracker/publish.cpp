@@ -52,8 +52,8 @@ std::shared_ptr<const MapSnapshot> Tracker::Publish(const Frame& frame, const St
   snapshot->pose_covariance = filter_.PoseCovariance();
   snapshot->velocity_in_world = camera.velocity_m_s;
   snapshot->angular_velocity_in_camera = camera.angular_velocity_rad_s;
-  snapshot->attempted = matches_.attempted;
-  snapshot->matched = matches_.accepted;
+  snapshot->attempted = matches_.attempted + SquaresAttempted();
+  snapshot->matched = matches_.accepted + SquaresFound();
   snapshot->searched_px2 = matches_.searched_px2;
   snapshot->map_revision = revision_;
   snapshot->map_generation = generation_;

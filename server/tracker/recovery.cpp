@@ -51,6 +51,7 @@ void Tracker::KeepKeyframe(const Frame& frame) {
 
 void Tracker::Recover(const Frame& frame) {
   matches_ = FrameMatches();
+  if (squares_ && RecoverBySquares(frame)) return;
   if (frames_lost_++ % kQueryEvery != 0) return;
   const auto found = relocaliser_.Query(frame.grey, *frame.camera,
                                         [this](FeatureId id) { return map_.Where(id, filter_); });

@@ -23,7 +23,11 @@ void Tracker::Begin(const Frame& frame) {
     monitor_.WaitForStart();
     return;
   }
-  const auto start = starter_.Try(*front_end_, filter_, map_.in_use());
+  std::optional<Start> start;
+  if (squares_ && squares_->has_known()) start = StartBySquares(frame);
+  if (!start && !WaitsForSquares()) {
+    start = starter_.Try(*front_end_, filter_, map_.in_use());
+  }
   times_.search_ms = watch.Lap_ms();
   if (!start) {
     monitor_.WaitForStart();
@@ -54,7 +58,7 @@ void Tracker::Begin(const Frame& frame) {
 void Tracker::SeekStart(const Frame& frame) {
   finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
   const auto found = finder_.Finish(frames_);
-  times_.waited_ms = finder_.waited_ms();
+  times_.waited_ms += finder_.waited_ms();
   if (found) {
     TakeOver(*found, frame);
     if (matches_.accepted < kAgreeing * matches_.attempted) StartAnew(frame);
@@ -97,6 +101,7 @@ void Tracker::TakeOver(const FoundStart& start, const Frame& frame) {
   held_ = true;
   finder_.Reset();
   ++revision_;
+  if (squares_) StartSquares(start);
 }
 
 }  // namespace saccade

@@ -17,6 +17,7 @@ namespace saccade {
 /// A start that holds, ready for filter and keyframe graph.
 struct FoundStart {
   struct Keyframe {
+    Timestamp time_ns = 0;
     Rigid3 world_from_camera;
     std::vector<GraphSighting> sightings;
     std::vector<GraphBirth> births;

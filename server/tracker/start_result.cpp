@@ -43,6 +43,7 @@ FoundStart::Keyframe StartFinder::ReadKeyframe(std::size_t k, const StartSolutio
                                                FoundStart& start) const {
   const StartProblem& found = solution.problem;
   FoundStart::Keyframe keyframe;
+  keyframe.time_ns = shots_[job_.shots[k]].time_ns;
   keyframe.world_from_camera = found.world_from_camera[k];
   for (const Seen& seen : shots_[job_.shots[k]].sightings) {
     keyframe.sightings.push_back(

@@ -42,16 +42,18 @@ RelocaliserOptions MakeRelocaliserOptions(const TrackerOptions& options) {
 
 absl::StatusOr<std::unique_ptr<Tracker>> Tracker::Create(const SourceInfo& source,
                                                          const TrackerOptions& options,
-                                                         std::unique_ptr<FrontEnd> front_end) {
+                                                         std::unique_ptr<FrontEnd> front_end,
+                                                         std::unique_ptr<SquareLandmarks> squares) {
   if (const absl::Status status = options.Validate(); !status.ok()) return status;
   if (const absl::Status status = Starter::Check(source); !status.ok()) return status;
   if (!front_end) front_end = std::make_unique<PictureFrontEnd>(source.camera, options);
   if (const absl::Status status = front_end->Check(source); !status.ok()) return status;
-  return std::unique_ptr<Tracker>(new Tracker(source, options, std::move(front_end)));
+  return std::unique_ptr<Tracker>(
+      new Tracker(source, options, std::move(front_end), std::move(squares)));
 }
 
 Tracker::Tracker(const SourceInfo& source, const TrackerOptions& options,
-                 std::unique_ptr<FrontEnd> front_end)
+                 std::unique_ptr<FrontEnd> front_end, std::unique_ptr<SquareLandmarks> squares)
     : source_(source),
       options_(options),
       front_end_(std::move(front_end)),
@@ -66,7 +68,8 @@ Tracker::Tracker(const SourceInfo& source, const TrackerOptions& options,
       refiner_(options),
       finder_(options),
       loops_(options, relocaliser_),
-      suspension_(options.suspend_rate_rad_s) {
+      suspension_(options.suspend_rate_rad_s),
+      squares_(std::move(squares)) {
   if (source.lens_assumed && options.learn_lens) {
     learner_ = std::make_unique<LensLearner>(options, source.camera);
   }
@@ -88,6 +91,9 @@ void Tracker::Reset() {
   matches_ = FrameMatches();
   before_relocalisation_.reset();
   started_ = metric_ = held_ = has_frame_ = false;
+  if (squares_) squares_->Reset();
+  in_squares_world_ = false;
+  waited_for_squares_ = 0;
   suspension_.Forget();
   frames_ = frames_lost_ = frames_tracked_ = 0;
   home_ = 1;
@@ -133,6 +139,10 @@ std::shared_ptr<const MapSnapshot> Tracker::TrackSeen(const Frame& frame) {
   last_frame_ = frame;
   if (last_frame_.mount && !ToVector(*last_frame_.mount).allFinite()) last_frame_.mount.reset();
   has_frame_ = true;
+  if (squares_) {
+    squares_->Look(frame, !started_ || monitor_.status() == TrackingStatus::kLost);
+    times_.waited_ms = squares_->waited_ms();
+  }
   if (!started_) {
     Begin(frame);
   } else if (monitor_.status() == TrackingStatus::kLost && Hopeless()) {
@@ -150,7 +160,7 @@ std::shared_ptr<const MapSnapshot> Tracker::TrackSeen(const Frame& frame) {
 }
 
 bool Tracker::Settled() const {
-  if (!held_) return false;
+  if (!held_ || WaitsForMetre()) return false;
   return options_.start || metric_ || monitor_.status() != TrackingStatus::kInitialising ||
          HasSettled(matches_, filter_, frames_, SettlingOptions());
 }
@@ -173,6 +183,7 @@ void Tracker::PredictAndSearch(const CameraModel& camera, double dt) {
   times_.predict_ms = watch.Lap_ms();
   if (suspended_) {
     matches_ = FrameMatches();
+    if (squares_) squares_->ForgetSearch();
     return;
   }
   matches_ = matcher_.Match(*front_end_, camera, filter_, map_.in_use(), {dt, noise}, random_);
@@ -182,14 +193,15 @@ void Tracker::PredictAndSearch(const CameraModel& camera, double dt) {
     matches_ = matcher_.Match(*front_end_, camera, filter_, map_.in_use(), {dt, noise}, random_);
     matches_.searched_px2 += searched_px2;
   }
+  if (squares_) SearchSquares();
   times_.search_ms = watch.Lap_ms();
 }
 
 void Tracker::Correct(const CameraModel& camera) {
   StopWatch watch;
   nis_ = 0.0;
+  std::vector<Observation> observations;
   if (matches_.accepted >= kFewestToUpdate) {
-    std::vector<Observation> observations;
     for (const LandmarkMatch& match : matches_.in_view) {
       if (!match.accepted()) continue;
       Observation observation;
@@ -202,8 +214,14 @@ void Tracker::Correct(const CameraModel& camera) {
       observation.noise = match.noise / match.weight;  // soft gate
       observations.push_back(observation);
     }
-    const auto report = filter_.Update(camera, observations, matches_.pose.world_from_camera);
-    if (!report.ok()) matches_.accepted = 0;
+  }
+  const Rigid3 at = SquaresFound() > 0 ? AddSquares(observations) : matches_.pose.world_from_camera;
+  if (!observations.empty()) {
+    const auto report = filter_.Update(camera, observations, at);
+    if (!report.ok()) {
+      matches_.accepted = 0;
+      if (squares_) squares_->ForgetSearch();
+    }
     nis_ = report.ok() ? report->nis : 0.0;
   }
   times_.update_ms = watch.Lap_ms();
@@ -218,8 +236,10 @@ void Tracker::Follow(const Frame& frame, double dt) {
   }
   Correct(*frame.camera);
   StopWatch watch;
+  const double waited_before_ms = times_.waited_ms;
   rate_.Record(matches_.attempted, matches_.accepted, MovedPx(*frame.camera, dt));
-  monitor_.Record(matches_.attempted, matches_.accepted, Settled());
+  monitor_.Record(matches_.attempted + SquaresAttempted(), matches_.accepted + SquaresFound(),
+                  Settled());
   const bool confirmed = monitor_.status() == TrackingStatus::kTracking ||
                          monitor_.status() == TrackingStatus::kInitialising;
   if (monitor_.refused()) {
@@ -229,8 +249,9 @@ void Tracker::Follow(const Frame& frame, double dt) {
     if (held_ && !learner_) lens_evidence_.Add(*frame.camera, filter_, matches_);
     Manage(frame);
     if (held_ && learner_) LearnLens(frame);
+    if (squares_) ManageSquares(frame);
   }
-  times_.manage_ms = watch.Lap_ms() - times_.waited_ms;
+  times_.manage_ms = watch.Lap_ms() - (times_.waited_ms - waited_before_ms);
 }
 
 /// How far things moved in the picture since the one before, about; nothing: too little was found.
@@ -283,7 +304,7 @@ void Tracker::Manage(const Frame& frame) {
   if (refiner_.Finish(frames_, frame.capture_time_ns, depth_.inverse_range, map_, filter_)) {
     ++revision_;
   }
-  times_.waited_ms = refiner_.waited_ms();
+  times_.waited_ms += refiner_.waited_ms();
   if (!telling || covered) return;
   if (const auto guess = Births::GuessDepth(filter_, matches_)) depth_ = *guess;
   Grow(frame, /*everywhere=*/false);

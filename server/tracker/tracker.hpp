@@ -21,6 +21,7 @@
 #include "server/tracker/picture_rate.hpp"
 #include "server/tracker/refiner.hpp"
 #include "server/tracker/retirement.hpp"
+#include "server/tracker/square_landmarks.hpp"
 #include "server/tracker/start_finder.hpp"
 #include "server/tracker/starter.hpp"
 #include "server/tracker/status_monitor.hpp"
@@ -37,11 +38,12 @@ namespace saccade {
 class Tracker final : public FrameTracker {
  public:
   /// `source`: the camera (never null) and, if the place has one, its target and start pose.
-  /// `front_end`: what answers for its frames; null: their pictures.
+  /// `front_end`: what answers for its frames; null: their pictures. `squares`: those that are
+  /// measured beside natural features; null: none.
   /// InvalidArgument: options out of range, no camera, a target that cannot be used.
-  static absl::StatusOr<std::unique_ptr<Tracker>> Create(const SourceInfo& source,
-                                                         const TrackerOptions& options,
-                                                         std::unique_ptr<FrontEnd> front_end = {});
+  static absl::StatusOr<std::unique_ptr<Tracker>> Create(
+      const SourceInfo& source, const TrackerOptions& options,
+      std::unique_ptr<FrontEnd> front_end = {}, std::unique_ptr<SquareLandmarks> squares = {});
   Tracker(const Tracker&) = delete;
   Tracker& operator=(const Tracker&) = delete;
 
@@ -68,6 +70,7 @@ class Tracker final : public FrameTracker {
     loops_.Wait();
     lens_evidence_.WaitForFit();
     if (learner_) learner_->Wait();
+    if (squares_) squares_->Wait();
   }
 
   /// Throws the map away; the next frame starts anew (with the target, where there is one in view).
@@ -92,10 +95,12 @@ class Tracker final : public FrameTracker {
   const FrameMatches& matches() const { return matches_; }
   /// Normalised innovation squared of the newest update: of all matches together; 0: none was.
   double nis() const { return nis_; }
+  /// Null without squares.
+  const SquareLandmarks* squares() const { return squares_.get(); }
 
  private:
   Tracker(const SourceInfo& source, const TrackerOptions& options,
-          std::unique_ptr<FrontEnd> front_end);
+          std::unique_ptr<FrontEnd> front_end, std::unique_ptr<SquareLandmarks> squares);
   std::shared_ptr<const MapSnapshot> TrackSeen(const Frame& frame);
   void Begin(const Frame& frame);
   /// Lost before there was a map that one could come back to.
@@ -138,6 +143,22 @@ class Tracker final : public FrameTracker {
   void LearnLens(const Frame& frame);
   /// Filter, map and keyframes anew, from a start that holds; the camera from this frame's matches.
   void TakeOver(const FoundStart& start, const Frame& frame);
+  // Squares (squares.cpp).
+  /// Puts the camera where squares of known place say it is: their world is the map's.
+  std::optional<Start> StartBySquares(const Frame& frame);
+  bool WaitsForSquares() const;
+  /// Squares in view are about to tell what a metre is: poses before would be in another unit.
+  bool WaitsForMetre() const;
+  void SearchSquares();
+  /// Adds what was found; the pose to linearise at.
+  Rigid3 AddSquares(std::vector<Observation>& observations);
+  void StartSquares(const FoundStart& start);
+  void ManageSquares(const Frame& frame);
+  bool RecoverBySquares(const Frame& frame);
+  /// The map becomes metric; `metre` in its units.
+  void TakeMetre(double metre);
+  int SquaresAttempted() const { return squares_ ? squares_->attempted() : 0; }
+  int SquaresFound() const { return squares_ ? static_cast<int>(squares_->found().size()) : 0; }
   std::optional<double> MovedPx(const CameraModel& camera, double dt) const;
   Difficulties SeeDifficulties() const;
   std::shared_ptr<const MapSnapshot> Publish(const Frame& frame, const StageTimes& times);
@@ -183,6 +204,9 @@ class Tracker final : public FrameTracker {
   double nis_ = 0.0;
   StageTimes times_;
   std::optional<Map::Checkpoint> before_relocalisation_;
+  std::unique_ptr<SquareLandmarks> squares_;
+  int waited_for_squares_ = 0;     // frames
+  bool in_squares_world_ = false;  // the map's world is that of the known squares
 };
 
 }  // namespace saccade
