@@ -19,9 +19,9 @@ constexpr int kLeastClearBands = 8;  // of twelve: something may lie over the ot
 constexpr double kLeastRedness = 28;
 constexpr double kMostFrameRedness = 0.3;
 // Outside of the frame it is brighter than in it, by so much of the contrast, in shadow too.
-constexpr double kLeastWhite = 0.2;
+constexpr double kLeastWhite = 0.24;
 // Brighter than the frame near by, of the contrast to white: covered, or in glare.
-constexpr double kBlackTolerance = 0.13, kRedTolerance = 0.35, kNoise = 5;
+constexpr double kBlackTolerance = 0.16, kRedTolerance = 0.35, kNoise = 5;
 // A reflection brightens cells, too, but bends nowhere as sharply as the edge of what covers one:
 // of its height, over an eighth of the side to either hand. Only squares so large are looked at.
 constexpr double kMostGlare = 0.75, kMostBend = 0.8, kLeastBend = 0.1, kBendNoise = 4;

@@ -86,9 +86,8 @@ absl::Status DetectEach(const std::vector<std::filesystem::path>& files, MarkerD
                       tally);
         continue;
       }
-      std::vector<MarkerSighting> sightings = detector.Detect(seen);
+      const std::vector<MarkerSighting> sightings = detector.Detect(seen);
       SayDropped(file, detector.dropped());
-      SayDropped(file, DropRepeated(sightings));
       if (sightings.empty()) SayIfMirrored(file, detector, seen);
       for (const MarkerSighting& sighting : sightings) out.Write(SightingRow(file, sighting));
       Count(sightings, tally);

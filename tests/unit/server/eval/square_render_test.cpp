@@ -32,13 +32,13 @@ TEST(SquareRender, IsTheSameEachTimeAndAnotherByNumber) {
 TEST(KollerDetector, FindsItsSquaresAndClaimsWhatItsCornersAre) {
   const auto detector = MakeMarkerDetector("koller", {});
   RenderScore score;
-  for (int k = 0; k < 300; ++k) {
+  for (int k = 0; k < 150; ++k) {
     const int id = k % 16;
     const SquareRender render = RenderSquare(*PatternOf("koller", id), kSeed, k);
     score.Add(render, "koller", id, (*detector)->Detect(render.color), 0);
   }
   EXPECT_EQ(score.wrong(), 0);
-  EXPECT_GE(score.VisibleFound(), 0.975);  // 0.99 of ten thousand: saccade-eval markers --renders
+  EXPECT_GE(score.VisibleFound(), 0.96);  // reflections on a tenth of them; figures: measurements
   // What is covered by something as dark as the square is refused: cells could be, too.
   EXPECT_GE(score.BorderCoveredFound(), 0.25);
   EXPECT_GT(score.Nees(), 1.3);
