@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "server/capture/frame.hpp"
+#include "server/tracker/lens_state.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -26,6 +28,8 @@ class FrameTracker {
                                                 double depth_sigma_m) = 0;
   /// The lens of the frame tracked last, where it is learnt; null: that of the frames.
   virtual std::shared_ptr<const CameraModel> lens() const { return nullptr; }
+  /// How far that is; nothing: it is not learnt.
+  virtual std::optional<LensState> lens_state() const { return std::nullopt; }
 };
 
 }  // namespace saccade

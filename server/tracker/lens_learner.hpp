@@ -8,6 +8,7 @@
 #include "server/capture/target.hpp"
 #include "server/features/image_pyramid.hpp"
 #include "server/map/map.hpp"
+#include "server/tracker/lens_state.hpp"
 #include "server/tracker/tracker_options.hpp"
 #include "shared/time/timestamp.hpp"
 
@@ -29,15 +30,6 @@ struct LensLearnerOptions {
   double least_shift_px = 0.1;  // a lens that differs by less is the same one
   double learnt = 0.01;         // sigma of the focal length from which it is as good as measured...
   double learnt_shift_px = 0.5;  // ...if it also stands still
-};
-
-/// What is known of a lens that is learnt while it is tracked, each with its sigma.
-struct LensState {
-  double focal_px = 0, focal_sigma_px = 0;
-  Eigen::Vector2d centre_px = Eigen::Vector2d::Zero(), centre_sigma_px = Eigen::Vector2d::Zero();
-  double k1 = 0, k1_sigma = 0, k2 = 0, k2_sigma = 0;  // Brown-Conrady
-  bool learnt = false;                                // as good as a measured one
-  int changes = 0;                                    // of the lens so far
 };
 
 /// Learns the lens of a camera that came without one, from the keyframes of the map, while it is

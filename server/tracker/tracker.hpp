@@ -59,7 +59,7 @@ class Tracker final : public FrameTracker {
   }
 
   /// What is known of it; nothing: the lens was given.
-  std::optional<LensState> lens_state() const {
+  std::optional<LensState> lens_state() const override {
     return learner_ ? std::optional(learner_->state()) : std::nullopt;
   }
 
