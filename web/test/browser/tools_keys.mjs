@@ -78,9 +78,10 @@ export async function byKeyboard(context) {
   note(
     'picture',
     await made(context, AnnotationShape.PICTURE, async () => {
+      // Before anything is pressed: a quick page asks the system for a file before the browser is told not to.
+      const chooser = page.waitForEvent('filechooser', { timeout: 60_000 });
       await opened(context, '#picture-file', () => ann.press('Enter'));
       await page.waitForFunction(() => document.activeElement?.id === 'picture-file');
-      const chooser = page.waitForEvent('filechooser');
       await ann.press('Enter');
       await (await chooser).setFiles(samplePng(context.folder));
       await page.locator('dialog[open] .preview canvas').waitFor({ timeout: 15_000 });
