@@ -174,8 +174,10 @@ async function areaByKeys(context) {
   for (let i = 0; i < 20; ++i) await ann.press('Shift+ArrowRight');
   for (let i = 0; i < 20; ++i) await ann.press('Shift+ArrowDown');
   await ann.press('Enter');
-  await sleep(500);
-  const byArea = await page.locator('aside li.selected').count();
+  let byArea = 0;
+  for (const end = Date.now() + 8000; byArea <= 2 && Date.now() < end; await sleep(100)) {
+    byArea = await page.locator('aside li.selected').count();
+  }
   const said = await noteOf(ann);
   await ann.press('v');
   await ann.press('p');
