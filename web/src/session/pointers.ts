@@ -18,7 +18,8 @@ export interface OthersPointer {
 const SILENT_MS = 1500;
 
 export class PointerBook {
-  private readonly known = new Map<string, OthersPointer>();
+  /** Of each person and kind the last one. One that is over is kept: after a silence it may go on, from there. */
+  private readonly known = new Map<string, OthersPointer & { readonly over: boolean }>();
   /** Told at once of what was heard. */
   heard: () => void = () => undefined;
 
@@ -29,7 +30,7 @@ export class PointerBook {
       const key = `${pb.participantId} ${pb.kind}`;
       const before = this.known.get(key);
       if (pb.released) {
-        if (before?.strokeId === pb.strokeId) this.known.delete(key);
+        if (before?.strokeId === pb.strokeId) this.known.set(key, { ...before, over: true });
         continue;
       }
       const news = pb.pointsInWorldM.map(toVec3);
@@ -43,6 +44,7 @@ export class PointerBook {
         colorRgba: pb.colorRgba || 0xffffffff,
         points: laser ? (newest ? [newest] : []) : [...old.slice(0, pb.first), ...news],
         heardMs: nowMs,
+        over: false,
       });
     }
     trace('saccade.pointer.heard');
@@ -50,10 +52,9 @@ export class PointerBook {
   }
 
   list(nowMs: number): OthersPointer[] {
-    for (const [key, { heardMs }] of this.known) {
-      if (nowMs - heardMs >= SILENT_MS) this.known.delete(key);
-    }
-    return [...this.known.values()];
+    return [...this.known.values()].filter(
+      ({ over, heardMs }) => !over && nowMs - heardMs < SILENT_MS,
+    );
   }
 
   clear(): void {

@@ -21,7 +21,7 @@ const BAR = { video: 0.05, frozen: 0.05, map: 0.05 }; // of the depth, in the me
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-export async function runClicks({ server: binary, chromium, seed, folder, count = COUNT }) {
+export async function runClicks({ server: binary, chromium, seed, folder, count = COUNT, only }) {
   const truthFile = join(folder, 'clicks.jsonl');
   const server = await startServer(binary, [
     ...['--source', `sim:desk?seed=${seed}&motion=sway&fps=15`, '--sim-truth', truthFile],
@@ -51,7 +51,7 @@ export async function runClicks({ server: binary, chromium, seed, folder, count 
     await context.expert.page.locator('canvas.map[data-eye]').waitFor();
     const each = Math.ceil(Number(count) / 3);
     for (const [pane, run] of Object.entries({ video, frozen, map })) {
-      await report(context, pane, each, run);
+      if (!only || only.split(',').includes(pane)) await report(context, pane, each, run);
     }
     const { errors } = context.expert;
     context.check('page errors', errors.length === 0, errors.join('; ') || 'none');
@@ -68,7 +68,7 @@ async function report(context, pane, wanted, run) {
   const found = [];
   const lost = { refused: 0, unanswered: 0 };
   const hz = [];
-  const end = Date.now() + 20_000 + wanted * 12_000;
+  const end = Date.now() + 20_000 + wanted * 30_000;
   await run(context, {
     enough: () => found.length >= wanted || Date.now() > end,
     keep: (hit) => found.push(hit),
@@ -128,8 +128,8 @@ async function video(context, session) {
   const used = new Map();
   while (!session.enough()) {
     const before = await expert.annotationIds();
-    const clickedMs = Date.now();
     const click = await aimInVideo(context, used);
+    const clickedMs = Date.now();
     if (!click) {
       await sleep(100);
       continue;
@@ -187,8 +187,8 @@ async function map(context, session) {
   const used = new Map();
   while (!session.enough()) {
     const before = await expert.annotationIds();
-    const clickedMs = Date.now();
     const click = await aimInMap(context, used);
+    const clickedMs = Date.now();
     if (!click) {
       await sleep(100);
       continue;

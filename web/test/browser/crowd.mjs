@@ -52,27 +52,10 @@ async function fill(context, count) {
   return present;
 }
 
-/** What the browser's processes have used so far [s]: the page's own, and that of the software GPU. */
-async function used(cdp) {
-  const { processInfo } = await cdp.send('SystemInfo.getProcessInfo');
-  const of = (type) =>
-    processInfo.filter((each) => each.type === type).reduce((sum, each) => sum + each.cpuTime, 0);
-  return { page: of('renderer'), gpu: of('GPU') };
-}
-
-/** Median of the page's own measure [ms], and how often it drew and at what cost, over some seconds. */
-async function measure({ page, context }) {
+/** Median of the page's own measure [ms], and how often it drew, over some seconds. */
+async function measure({ page }) {
   await sleep(3000); // what is new is drawn once
-  const cdp = await context.browser().newBrowserCDPSession();
-  const before = await used(cdp);
-  const told = await overSeconds(page);
-  const after = await used(cdp);
-  const perFrame = (name) => (1000 * (after[name] - before[name])) / told.frames;
-  return { ...told, pageMs: perFrame('page'), gpuMs: perFrame('gpu') };
-}
-
-const overSeconds = (page) =>
-  page.evaluate(async () => {
+  return page.evaluate(async () => {
     const begin = performance.now();
     let frames = 0;
     const taken = [];
@@ -87,11 +70,11 @@ const overSeconds = (page) =>
     });
     taken.sort((a, b) => a - b);
     return {
-      frames,
       overlayMs: taken[taken.length >> 1],
       perSecond: (1000 * frames) / (performance.now() - begin),
     };
   });
+}
 
 export async function benchmark(context) {
   const { ann, check, annotations, session } = context;
@@ -120,8 +103,6 @@ export async function benchmark(context) {
     present >= MANY && share < 1,
     `drawing over the picture: ${many.overlayMs.toFixed(2)} ms, ${(100 * share).toFixed(0)} % of ${FRAME_MS.toFixed(1)} ms; ` +
       `with ${FEW} ${few.overlayMs.toFixed(2)} ms, ratio ${(many.overlayMs / few.overlayMs).toFixed(1)}; ` +
-      `processor time of a redraw: page ${many.pageMs.toFixed(0)} against ${few.pageMs.toFixed(0)} ms, ` +
-      `software GPU ${many.gpuMs.toFixed(0)} against ${few.gpuMs.toFixed(0)} ms; ` +
       `page ${many.perSecond.toFixed(1)} redraws a second against ${few.perSecond.toFixed(1)} (software GL)`,
   );
 }

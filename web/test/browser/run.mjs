@@ -1,6 +1,6 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
-//        [--only CHECK,CHECK]  (of tools)  [--count N]  (of clicks)
+//        [--only CHECK,CHECK]  (of tools; of clicks the view)  [--count N]  (of clicks)
 //        [--part PART]
 // page: what is in no other part. gaze: the turning of the head. dots: measured features while the wearer turns.
 // person: typing, keys, tabs, a reload. invite: TLS, invites and what ends them, from another address than

@@ -149,12 +149,12 @@ async function nameIsAskedOnce(context) {
   await page.keyboard.press('Enter');
   await tracked(context);
   const person = context.ann.page.locator('.participant .who', { hasText: /^Bo$/ });
-  await person.waitFor({ state: 'attached', timeout: 10_000 });
+  await person.waitFor({ state: 'attached', timeout: 30_000 });
   await page.reload();
   await page.locator('.app[data-first-picture-ms]').waitFor();
   await tracked(context);
   const again = await page.locator('dialog[open]').count();
-  await person.waitFor({ state: 'attached', timeout: 10_000 }); // he was gone for the reload
+  await person.waitFor({ state: 'attached', timeout: 30_000 }); // he was gone for the reload
   const key = await page.evaluate(() => window.localStorage.getItem('saccade.person'));
   const colours = await context.ann.page
     .locator('.participant .person')

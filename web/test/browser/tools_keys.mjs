@@ -78,9 +78,10 @@ export async function byKeyboard(context) {
   note(
     'picture',
     await made(context, AnnotationShape.PICTURE, async () => {
+      // Before anything is pressed: a quick page asks the system for a file before the browser is told not to.
+      const chooser = page.waitForEvent('filechooser', { timeout: 60_000 });
       await opened(context, '#picture-file', () => ann.press('Enter'));
       await page.waitForFunction(() => document.activeElement?.id === 'picture-file');
-      const chooser = page.waitForEvent('filechooser');
       await ann.press('Enter');
       await (await chooser).setFiles(samplePng(context.folder));
       await page.locator('dialog[open] .preview canvas').waitFor({ timeout: 15_000 });
@@ -173,8 +174,10 @@ async function areaByKeys(context) {
   for (let i = 0; i < 20; ++i) await ann.press('Shift+ArrowRight');
   for (let i = 0; i < 20; ++i) await ann.press('Shift+ArrowDown');
   await ann.press('Enter');
-  await sleep(500);
-  const byArea = await page.locator('aside li.selected').count();
+  let byArea = 0;
+  for (const end = Date.now() + 8000; byArea <= 2 && Date.now() < end; await sleep(100)) {
+    byArea = await page.locator('aside li.selected').count();
+  }
   const said = await noteOf(ann);
   await ann.press('v');
   await ann.press('p');

@@ -91,6 +91,21 @@ describe('what others point at', () => {
     expect(book.list(0)[0]!.points.map(({ x }) => x)).toEqual([0, 1, 2, 3]);
   });
 
+  it('goes on with the whole stroke after a silence, which the server told as its end', () => {
+    const book = new PointerBook();
+    say(book, { kind: PointerKind.SKETCH, first: 0, pointsInWorldM: [at(0), at(1)] });
+    say(book, { kind: PointerKind.SKETCH, released: true });
+    expect(book.list(0)).toEqual([]);
+    say(book, { kind: PointerKind.SKETCH, first: 2, pointsInWorldM: [at(2)] });
+    expect(book.list(0)[0]!.points.map(({ x }) => x)).toEqual([0, 1, 2]);
+    // Nor is it lost where nothing was heard for long.
+    expect(book.list(5000)).toEqual([]);
+    say(book, { kind: PointerKind.SKETCH, first: 3, pointsInWorldM: [at(3)] }, 5000);
+    expect(book.list(5000)[0]!.points.map(({ x }) => x)).toEqual([0, 1, 2, 3]);
+    say(book, { kind: PointerKind.SKETCH, strokeId: 'next', first: 0, pointsInWorldM: [at(7)] });
+    expect(book.list(0)[0]!.points.map(({ x }) => x)).toEqual([7]);
+  });
+
   it('ends with its own stroke, and after a silence', () => {
     const book = new PointerBook();
     say(book, { kind: PointerKind.LASER, pointsInWorldM: [at(1)], strokeId: 'new' });
