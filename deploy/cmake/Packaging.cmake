@@ -5,7 +5,7 @@ install(TARGETS saccade saccade-server saccade-eval saccade-decode saccade-clien
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/web/dist/ DESTINATION share/saccade/web OPTIONAL)
 install(FILES ${CMAKE_SOURCE_DIR}/README.md ${debian}/copyright DESTINATION share/doc/saccade)
 install(FILES ${CMAKE_SOURCE_DIR}/docs/configuration.md ${CMAKE_SOURCE_DIR}/docs/security.md
-              ${CMAKE_SOURCE_DIR}/docs/install.md ${CMAKE_SOURCE_DIR}/docs/phone.md
+              ${CMAKE_SOURCE_DIR}/docs/install.md ${CMAKE_SOURCE_DIR}/docs/phone.md ${CMAKE_SOURCE_DIR}/docs/scene.md
               ${CMAKE_SOURCE_DIR}/docs/desktop.md
         DESTINATION share/doc/saccade)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/examples DESTINATION share/doc/saccade

@@ -15,7 +15,7 @@ using std::string_view;
 
 // Listed along the data flow: a folder includes only itself and those before it.
 constexpr auto kServerOrder = std::to_array<string_view>(
-    {"pipeline", "mount",   "gl",      "capture", "sim",      "features", "markers", "filter",
+    {"pipeline", "mount",   "gl",      "capture", "sim",      "scene",    "features", "markers", "filter",
      "map",      "tracker", "anchors", "gaze",    "wearable", "overlay",  "encode",  "store",
      "identity", "rpc",     "wear",    "gateway", "eval",     "app"});
 constexpr auto kClientOrder =
@@ -66,6 +66,8 @@ const std::vector<Home>& Homes() {
       {"libavcodec/", {"server/capture"}},
       {"seccomp.h", {"server/capture"}},
       {"apriltag/", {"server/markers"}},
+      {"tiny_gltf.h", {"server/scene"}},
+      {"fcl/", {"server/scene"}},
       {"opencv2/aruco", {"server/markers"}},
       {"opencv2/videoio", {}},
       {"opencv2/highgui", {}},
