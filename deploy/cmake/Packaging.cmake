@@ -10,6 +10,8 @@ install(FILES ${CMAKE_SOURCE_DIR}/docs/configuration.md ${CMAKE_SOURCE_DIR}/docs
         DESTINATION share/doc/saccade)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/examples DESTINATION share/doc/saccade
         PATTERN CMakeLists.txt EXCLUDE PATTERN node_modules EXCLUDE PATTERN dist EXCLUDE PATTERN gen EXCLUDE)
+# Models to place.
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/deploy/models/ DESTINATION share/saccade/models FILES_MATCHING PATTERN "*.glb")
 # Opens saccade:// links; the cache of such handlers is the system's to renew (a dpkg trigger).
 install(FILES ${debian}/saccade-client.desktop DESTINATION share/applications)
 install(FILES ${debian}/saccade.svg DESTINATION share/icons/hicolor/scalable/apps)

@@ -217,12 +217,9 @@ const char* Word(const std::array<std::pair<const char*, Enum>, kCount>& choices
 
 }  // namespace
 
-absl::StatusOr<SceneContents> ParseScene(absl::string_view text,
-                                         const std::filesystem::path& folder,
-                                         const GltfLimits& limits) {
+absl::StatusOr<std::vector<SceneObject>> ParseSceneObjects(absl::string_view text) {
   const json root = json::parse(text.begin(), text.end(), nullptr, false, true);
   if (root.is_discarded()) return Bad("scene", "is not JSON; check commas and brackets");
-  SceneContents contents;
   Fields fields(root, "scene");
   fields.Require("objects");
   const json* objects = fields.Find("objects");
@@ -231,12 +228,22 @@ absl::StatusOr<SceneContents> ParseScene(absl::string_view text,
   if (objects->size() > kMostSceneObjects) {
     return Bad("objects", absl::StrCat(objects->size(), "; at most ", kMostSceneObjects));
   }
+  std::vector<SceneObject> all;
   for (std::size_t i = 0; i < objects->size(); ++i) {
     absl::StatusOr<SceneObject> object =
         ReadObject((*objects)[i], absl::StrFormat("objects[%d]", i));
     if (!object.ok()) return object.status();
-    contents.objects.push_back(*std::move(object));
+    all.push_back(*std::move(object));
   }
+  return all;
+}
+
+absl::StatusOr<SceneContents> ParseScene(absl::string_view text,
+                                         const std::filesystem::path& folder,
+                                         const GltfLimits& limits) {
+  absl::StatusOr<std::vector<SceneObject>> objects = ParseSceneObjects(text);
+  if (!objects.ok()) return objects.status();
+  SceneContents contents{*std::move(objects), {}};
   if (absl::Status read = ReadModels(folder, limits, contents); !read.ok()) return read;
   return contents;
 }

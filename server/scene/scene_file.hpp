@@ -33,6 +33,9 @@ absl::StatusOr<SceneContents> ParseScene(absl::string_view json,
 absl::StatusOr<SceneContents> ReadSceneFile(const std::filesystem::path& file,
                                             const GltfLimits& limits = {});
 
+/// The objects alone, whether their models are there or not.
+absl::StatusOr<std::vector<SceneObject>> ParseSceneObjects(absl::string_view json);
+
 /// What ParseScene reads; models are named by their ids.
 std::string SceneToJson(const std::vector<SceneObject>& objects);
 

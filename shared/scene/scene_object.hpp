@@ -43,7 +43,7 @@ struct SceneObject {
 
 /// Triangles to place, kept once however often they are placed. Immutable.
 struct SceneModel {
-  std::string id;    // SHA-256 of its file, lower-case hex; "library/NAME" for those that ship
+  std::string id;    // SHA-256 of its file, lower-case hex; of a scene file: the path there
   std::string name;  // 1 to 100 bytes
   TriangleMesh mesh;
   std::shared_ptr<const std::string> file;  // GLB; never null
