@@ -10,7 +10,7 @@
 namespace saccade {
 namespace {
 
-// Edges of what hides lie within a fifth of a pixel then; at one drawn pixel, a third.
+// The edges of what hides: finer than the picture's own pixels, which the lens cuts anew.
 constexpr double kDrawnPerPixel = 2.0;
 
 }  // namespace

@@ -12,6 +12,7 @@ import { Pane } from './pane';
 import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
 import { save, takeSnapshot } from './snapshot';
+import { SceneLayer } from './scene_layer';
 import { Still } from './still';
 import { crowdedWords, lostWords, pauseWords } from './words';
 
@@ -21,10 +22,13 @@ const STALE_MS = 1000;
 export class VideoPane extends Pane {
   private still: Still | undefined;
   private readonly darkness = new Darkness();
+  private readonly scene: SceneLayer;
 
   constructor(session: Session, player: Player, state: AppState, pictures: PictureCache) {
     const words = { className: 'video', label: 'Live video', title: 'Video' };
     super('video', words, [player.canvas], session, player, state, pictures);
+    this.scene = new SceneLayer(session);
+    player.canvas.after(this.scene.element);
   }
 
   get frozen(): boolean {
@@ -118,6 +122,7 @@ export class VideoPane extends Pane {
     this.painter.begin(this.size, layout);
     this.painter.clip(layout.width, layout.height);
     const current = this.current();
+    this.scene.draw(current?.view, this.player.canvas.style.transform);
     if (current?.view) this.drawFrame(current.facts, current.view);
     this.painter.end();
     this.took(performance.now() - begin);
