@@ -40,6 +40,9 @@ foreach(module core imgproc imgcodecs calib3d features2d flann video aruco)
     IMPORTED_LOCATION ${OPENCV_${module}_LIBRARY}
     INTERFACE_INCLUDE_DIRECTORIES ${OPENCV_INCLUDE_DIR})
 endforeach()
+# Models (GLB), and what they touch.
+pkg_check_modules(TinyGltf REQUIRED IMPORTED_TARGET tinygltf)
+find_package(fcl REQUIRED)
 # Square markers.
 find_package(apriltag CONFIG REQUIRED)
 pkg_check_modules(Cairo REQUIRED IMPORTED_TARGET cairo cairo-pdf cairo-svg)  # sheets of them

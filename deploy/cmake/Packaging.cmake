@@ -5,11 +5,13 @@ install(TARGETS saccade saccade-server saccade-eval saccade-decode saccade-clien
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/web/dist/ DESTINATION share/saccade/web OPTIONAL)
 install(FILES ${CMAKE_SOURCE_DIR}/README.md ${debian}/copyright DESTINATION share/doc/saccade)
 install(FILES ${CMAKE_SOURCE_DIR}/docs/configuration.md ${CMAKE_SOURCE_DIR}/docs/security.md
-              ${CMAKE_SOURCE_DIR}/docs/install.md ${CMAKE_SOURCE_DIR}/docs/phone.md
+              ${CMAKE_SOURCE_DIR}/docs/install.md ${CMAKE_SOURCE_DIR}/docs/phone.md ${CMAKE_SOURCE_DIR}/docs/scene.md
               ${CMAKE_SOURCE_DIR}/docs/desktop.md
         DESTINATION share/doc/saccade)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/examples DESTINATION share/doc/saccade
         PATTERN CMakeLists.txt EXCLUDE PATTERN node_modules EXCLUDE PATTERN dist EXCLUDE PATTERN gen EXCLUDE)
+# Models to place.
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/deploy/models/ DESTINATION share/saccade/models FILES_MATCHING PATTERN "*.glb")
 # Opens saccade:// links; the cache of such handlers is the system's to renew (a dpkg trigger).
 install(FILES ${debian}/saccade-client.desktop DESTINATION share/applications)
 install(FILES ${debian}/saccade.svg DESTINATION share/icons/hicolor/scalable/apps)

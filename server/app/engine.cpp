@@ -51,9 +51,11 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, Event
       facts_{options_.version, NameOf(source->info()), source->info().camera},
       sink_(sink),
       pictures_(options_.pictures ? options_.pictures : *PictureSwitch::Open("")),
+      scene_(options_.scene ? options_.scene : *SceneKeeper::Open("")),
       source_(std::move(source)),
       inbox_(options_.mailbox),
       clock_(/*paced=*/!options_.every_frame),
+      scene_layer_(options_.gl),
       stills_({.capacity = kStillsWaiting, .when_full = WhenFull::kRefuse},
               [this](StillRequest request) { MakeStill(std::move(request)); }) {
   if (options_.mount) {
@@ -71,6 +73,7 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, Event
       VideoView::kAugmented, options_.video_bit_rate_bit_s,
       [this](const TrackedFrame& frame) { return DrawAugmented(frame, /*waits=*/false); }, may_show,
       sink_);
+  scene_->SetAnnotations([this] { return annotations(); });
   pictures_->SetOnChange(
       [this](const std::shared_ptr<const PicturePause>& state) { OnPicturePause(state); });
 }
@@ -107,6 +110,7 @@ void Engine::Stop() {
     thread->request_stop();
   }
   pictures_->Stop();
+  scene_->Stop();
   source_->Stop();           // its next frame may not be due for long
   if (gaze_) gaze_->Stop();  // the head stops now, however long the frame takes that is tracked
   for (const Command& command : inbox_.Close()) {

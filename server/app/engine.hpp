@@ -14,6 +14,8 @@
 #include "server/app/gaze_runner.hpp"
 #include "server/app/picture_gallery.hpp"
 #include "server/app/picture_switch.hpp"
+#include "server/app/scene_keeper.hpp"
+#include "server/app/scene_layer.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/capture/frame_source.hpp"
 #include "server/overlay/overlay.hpp"
@@ -37,6 +39,8 @@ struct EngineOptions {
   std::optional<CameraIntrinsics> crop;
   GazeOptions gaze;
   std::shared_ptr<PictureSwitch> pictures;  // null: one that keeps nothing
+  std::shared_ptr<SceneKeeper> scene;       // likewise
+  GlBackend gl = GlBackend::kOsmesa;
 };
 
 /// Capture to packets: owns the threads and what they share.
@@ -79,6 +83,8 @@ class Engine : public Backend {
   void RequestKeyFrame(VideoView view) override;
   void PausePicture(bool paused, std::string by, Done<PicturePause> done) override;
   std::shared_ptr<const PicturePause> picture_pause() const override;
+  std::shared_ptr<const Scene> scene() const override;
+  absl::Status SubmitScene(SceneCommand command) override;
 
  private:
   // What the tracker thread waits for: a frame, the end of the source, or (neither) a second
@@ -114,6 +120,7 @@ class Engine : public Backend {
   ServerFacts facts_;
   EventSink& sink_;
   const std::shared_ptr<PictureSwitch> pictures_;
+  const std::shared_ptr<SceneKeeper> scene_;
   std::unique_ptr<FrameSource> source_;  // source thread
   std::unique_ptr<Wearable> wearable_;   // tracker thread, but for what says otherwise
   Inbox<Input, Command> inbox_;
@@ -132,6 +139,7 @@ class Engine : public Backend {
   std::unique_ptr<GazeRunner> gaze_;  // null: no mount
 
   mutable PictureGallery gallery_;
+  mutable SceneLayer scene_layer_;
   mutable std::mutex pointers_mutex_;
   std::shared_ptr<const PointerList> pointers_;  // null: none so far
 

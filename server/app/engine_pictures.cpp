@@ -14,6 +14,12 @@ void Engine::PausePicture(bool paused, std::string by, Done<PicturePause> done) 
 
 std::shared_ptr<const PicturePause> Engine::picture_pause() const { return pictures_->state(); }
 
+std::shared_ptr<const Scene> Engine::scene() const { return scene_->scene(); }
+
+absl::Status Engine::SubmitScene(SceneCommand command) {
+  return scene_->Submit(std::move(command));
+}
+
 void Engine::OnPicturePause(const std::shared_ptr<const PicturePause>& state) {
   for (const auto& view : views_) view->AwaitFrame();
   sink_.OnPicturePause(state);
@@ -73,6 +79,10 @@ cv::Mat Engine::DrawAugmented(const TrackedFrame& frame, bool waits) const {
     const std::lock_guard lock(pointers_mutex_);
     overlay.pointers = pointers_;
   }
+  overlay.scene = [this, &frame](const CameraModel& camera, const Rigid3& world_from_camera) {
+    return scene_layer_.Draw(*scene_->scene(), *frame.tracked.annotations, camera,
+                             world_from_camera);
+  };
   cv::Mat picture =
       Augment(*frame.frame, *frame.tracked.snapshot, *frame.tracked.annotations, overlay);
   if (options_.crop) {

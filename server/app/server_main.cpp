@@ -95,6 +95,10 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, E
   absl::StatusOr<std::unique_ptr<PictureSwitch>> pictures = PictureSwitch::Open(config.data_dir);
   if (!pictures.ok()) return pictures.status();
   options.pictures = *std::move(pictures);
+  absl::StatusOr<std::unique_ptr<SceneKeeper>> scene = SceneKeeper::Open(config.data_dir);
+  if (!scene.ok()) return scene.status();
+  options.scene = *std::move(scene);
+  options.gl = config.gl;
   options.overlay.features = config.overlay_dots;
   options.overlay.world_axes = config.overlay_axes;
   options.overlay.status_line = config.overlay_status;

@@ -84,6 +84,11 @@ struct CalibrateTargetArguments {
   std::filesystem::path out;
   bool json = false;
 };
+struct PlacementsArguments {
+  std::uint64_t seed = 1;
+  int count = 1000;
+  std::filesystem::path out;
+};
 struct PoseGraphArguments {
   std::filesystem::path in, out;
   std::string cost = "chordal";  // or chi2
@@ -115,6 +120,10 @@ absl::Status PrintMarkersCommand(const PrintMarkersArguments& arguments);
 /// Finds a lens from the pictures of a folder or a source that show a board or a sheet of tags, and
 /// writes it as camera.yaml.
 absl::Status CalibrateTargetCommand(const CalibrateTargetArguments& arguments);
+/// Places random things in random rooms and judges where they came to rest (T34).
+absl::Status PlacementsCommand(const PlacementsArguments& arguments);
+/// Holds what hides virtual things against rays cast into the simulated room (T33).
+absl::Status OcclusionCommand(const PlacementsArguments& arguments);
 /// Whether the source is paced by the world, and ends when somebody ends it.
 bool IsLive(absl::string_view uri);
 /// InvalidArgument with the remedy: `uri` is a phone's, which only a server receives.

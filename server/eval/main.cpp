@@ -198,6 +198,33 @@ void AddCalibrateTarget(CLI::App& app, CalibrateTargetArguments& arguments) {
   calibrate->add_flag("--json", arguments.json, "Print the report as JSON");
 }
 
+void AddPlacements(CLI::App& app, PlacementsArguments& arguments) {
+  CLI::App* placements = app.add_subcommand(
+      "placements", "Push and lower random things in random rooms; judge where they rest");
+  placements->add_option("--seed", arguments.seed, "Seed of all rooms and things")
+      ->check(NotNegative())
+      ->capture_default_str();
+  placements->add_option("--count", arguments.count, "Things that come to rest")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  placements->add_option("--out", arguments.out, "Folder for placements.csv and report.json")
+      ->required();
+}
+
+void AddOcclusion(CLI::App& app, PlacementsArguments& arguments) {
+  CLI::App* occlusion = app.add_subcommand(
+      "occlusion", "Draw virtual things behind real ones; hold what is seen against cast rays");
+  occlusion->add_option("--seed", arguments.seed, "Seed of the room, the wearer and the things")
+      ->check(NotNegative())
+      ->capture_default_str();
+  occlusion->add_option("--count", arguments.count, "Pictures")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  occlusion
+      ->add_option("--out", arguments.out, "Folder for occlusion.csv, report.json and pictures")
+      ->required();
+}
+
 /// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell
 /// starts what is in the background deaf to SIGINT, and a mask of blocked signals is inherited.
 void HearSignals() {
@@ -246,6 +273,8 @@ int Main(int argc, char** argv) {
   MarkersArguments markers;
   PrintMarkersArguments print;
   CalibrateTargetArguments target;
+  PlacementsArguments placements, occlusion;
+  occlusion.count = 100;
   AddRun(app, run);
   AddScore(app, score);
   AddSim(app, sim);
@@ -256,6 +285,8 @@ int Main(int argc, char** argv) {
   AddMarkers(app, markers);
   AddPrintMarkers(app, print);
   AddCalibrateTarget(app, target);
+  AddPlacements(app, placements);
+  AddOcclusion(app, occlusion);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -274,6 +305,8 @@ int Main(int argc, char** argv) {
     status = markers.renders > 0 ? MarkersRenderCommand(markers) : MarkersCommand(markers);
   }
   if (app.got_subcommand("calibrate")) status = CalibrateTargetCommand(target);
+  if (app.got_subcommand("placements")) status = PlacementsCommand(placements);
+  if (app.got_subcommand("occlusion")) status = OcclusionCommand(occlusion);
   return status.ok() ? 0 : Fail(status);
 }
 

@@ -38,6 +38,14 @@ constexpr auto kTable = std::to_array<RoleRow>({
 
     {"PointerService/Point", kAnnotator},
 
+    {"SceneService/ListScene", kViewer},
+    {"SceneService/GetModel", kViewer},
+    {"SceneService/PutObject", kAnnotator},
+    {"SceneService/RemoveObject", kAnnotator},
+    {"SceneService/PlaceObject", kAnnotator},
+    {"SceneService/UploadModel", kAnnotator},
+    {"SceneService/RegisterObject", kAnnotator},
+
     {"TalkService/ListMessages", kViewer},
     {"TalkService/Say", kAnnotator},
     {"TalkService/Speak", kAnnotator},

@@ -9,6 +9,7 @@
 #include "server/overlay/label_painter.hpp"
 #include "server/overlay/painter.hpp"
 #include "server/overlay/picture_painter.hpp"
+#include "server/scene/scene_view.hpp"
 #include "shared/marks/strokes.hpp"
 
 namespace saccade {
@@ -170,6 +171,10 @@ cv::Mat Augment(const Frame& frame, const MapSnapshot& snapshot,
   const CameraModel& camera = *frame.camera;
   // Without a pose nothing can be registered: better no mark than one in the wrong place.
   if (HasPose(snapshot)) {
+    if (options.scene) {
+      const cv::Mat scene = options.scene(camera, snapshot.world_from_camera);
+      if (scene.size() == picture.size()) Blend(scene, picture);
+    }
     if (options.world_axes) DrawAxes(camera, snapshot, painter);
     if (options.features) DrawFeatures(camera, snapshot, options, painter);
     if (options.annotations)

@@ -26,6 +26,8 @@ struct OverlayOptions {
   std::shared_ptr<const PointerList> pointers;    // null: none
   /// Decoded, BGR; empty: not yet. Null: outlines alone are drawn.
   std::function<cv::Mat(const PicturePtr&)> picture;
+  /// The scene from there as SceneView draws it, or empty; lies under every mark. Null: none.
+  std::function<cv::Mat(const CameraModel&, const Rigid3& world_from_camera)> scene;
 };
 
 /// The picture of `frame` with everything that `snapshot` (of the same frame) and `annotations`

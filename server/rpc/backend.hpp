@@ -15,6 +15,7 @@
 #include "server/pipeline/events.hpp"
 #include "server/pipeline/gaze_commands.hpp"
 #include "server/pipeline/pointers.hpp"
+#include "server/pipeline/scene_commands.hpp"
 
 namespace saccade {
 
@@ -71,6 +72,10 @@ class Backend : public CommandPort {
   virtual void PausePicture(bool paused, std::string by, Done<PicturePause> done) = 0;
   /// Never null.
   virtual std::shared_ptr<const PicturePause> picture_pause() const = 0;
+  /// With every change that was answered; never null.
+  virtual std::shared_ptr<const Scene> scene() const = 0;
+  /// To the scene's thread. On error `done` is not called: ResourceExhausted, Unavailable.
+  virtual absl::Status SubmitScene(SceneCommand command) = 0;
 };
 
 }  // namespace saccade

@@ -15,6 +15,7 @@
 #include "server/rpc/map_service.hpp"
 #include "server/rpc/pointer_board.hpp"
 #include "server/rpc/pointer_service.hpp"
+#include "server/rpc/scene_service.hpp"
 #include "server/rpc/session_service.hpp"
 #include "server/rpc/talk_service.hpp"
 
@@ -100,6 +101,7 @@ class RpcServer::Impl {
         map_service_(backend, hub, gate_),
         gaze_service_(backend, gate_),
         pointer_service_(backend, pointers_, gate_),
+        scene_service_(backend, gate_),
         talk_service_(backend, hub, gate_, options.limits.voice_packets) {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
@@ -147,6 +149,7 @@ class RpcServer::Impl {
     builder.RegisterService(&map_service_);
     builder.RegisterService(&gaze_service_);
     builder.RegisterService(&pointer_service_);
+    builder.RegisterService(&scene_service_);
     builder.RegisterService(&talk_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
@@ -193,6 +196,7 @@ class RpcServer::Impl {
   MapService map_service_;
   GazeService gaze_service_;
   PointerService pointer_service_;
+  SceneService scene_service_;
   TalkService talk_service_;
   std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
   std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs

@@ -58,8 +58,12 @@ Eigen::Vector2d Lens::DrawnFromCamera(const CameraModel& camera,
 
 void Lens::Apply(const cv::Mat& drawn, cv::Mat& bgr) const {
   cv::Mat bent;
-  cv::remap(drawn, bent, map_, map_fraction_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  Bend(drawn, bent);
   cv::cvtColor(bent, bgr, cv::COLOR_BGRA2BGR);
+}
+
+void Lens::Bend(const cv::Mat& drawn, cv::Mat& bent) const {
+  cv::remap(drawn, bent, map_, map_fraction_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
 }
 
 }  // namespace saccade

@@ -19,6 +19,9 @@ class Lens {
   /// `drawn` is view().height x view().width, CV_8UC4; gives CV_8UC3 of the camera's size.
   void Apply(const cv::Mat& drawn, cv::Mat& bgr) const;
 
+  /// The same of any pixels that cv::remap takes; what it shows keeps its type.
+  void Bend(const cv::Mat& drawn, cv::Mat& bent) const;
+
   /// Where camera pixel (u, v) is in the drawn picture.
   Eigen::Vector2d DrawnFromCamera(const CameraModel& camera, const Eigen::Vector2d& pixel) const;
 

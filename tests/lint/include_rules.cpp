@@ -15,9 +15,9 @@ using std::string_view;
 
 // Listed along the data flow: a folder includes only itself and those before it.
 constexpr auto kServerOrder = std::to_array<string_view>(
-    {"pipeline", "mount",   "gl",      "capture", "sim",      "features", "markers", "filter",
-     "map",      "tracker", "anchors", "gaze",    "wearable", "overlay",  "encode",  "store",
-     "identity", "rpc",     "wear",    "audio",   "gateway",  "eval",     "app"});
+    {"pipeline", "mount",    "gl",      "capture", "sim",   "scene",    "features", "markers",
+     "filter",   "map",      "tracker", "anchors", "gaze",  "wearable", "overlay",  "encode",
+     "store",    "identity", "rpc",     "wear",    "audio", "gateway",  "eval",     "app"});
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder = std::to_array<string_view>(
@@ -70,6 +70,8 @@ const std::vector<Home>& Homes() {
       {"seccomp.h", {"server/capture"}},
       {"apriltag/", {"server/markers"}},
       {"cairo", {"server/markers"}},
+      {"tiny_gltf.h", {"server/scene"}},
+      {"fcl/", {"server/scene"}},
       {"opencv2/aruco", {"server/markers"}},
       {"opencv2/videoio", {}},
       {"opencv2/highgui", {}},

@@ -15,6 +15,7 @@
 #include "saccade/v1/gaze.pb.h"
 #include "saccade/v1/map.pb.h"
 #include "saccade/v1/pointer.pb.h"
+#include "saccade/v1/scene.pb.h"
 #include "saccade/v1/session.pb.h"
 #include "saccade/v1/wearer.pb.h"
 #include "tests/integration/identity/guarded_server.hpp"
@@ -49,6 +50,13 @@ const std::map<std::string, Least>& Promised() {
                                                     {"SessionService/GetFrame", kViewer},
                                                     {"SessionService/GetStatus", kViewer},
                                                     {"SessionService/PausePicture", kWearer},
+                                                    {"SceneService/ListScene", kViewer},
+                                                    {"SceneService/GetModel", kViewer},
+                                                    {"SceneService/PutObject", kAnnotator},
+                                                    {"SceneService/RemoveObject", kAnnotator},
+                                                    {"SceneService/PlaceObject", kAnnotator},
+                                                    {"SceneService/UploadModel", kAnnotator},
+                                                    {"SceneService/RegisterObject", kAnnotator},
                                                     {"TalkService/ListMessages", kViewer},
                                                     {"TalkService/Say", kAnnotator},
                                                     {"TalkService/Speak", kAnnotator},
@@ -85,10 +93,11 @@ const std::map<std::string, Least>& Promised() {
 std::vector<const MethodDescriptor*> EveryMethod() {
   std::vector<const MethodDescriptor*> all;
   // Referred to, so that the linker keeps what stands in their files.
-  for (const auto* linked : {v1::GetAccessRequest::descriptor(), v1::JoinRequest::descriptor(),
-                             v1::ListAnnotationsRequest::descriptor(),
-                             v1::GetMapRequest::descriptor(), v1::GetGazeStateRequest::descriptor(),
-                             v1::PointRequest::descriptor(), v1::WearerHello::descriptor()}) {
+  for (const auto* linked :
+       {v1::GetAccessRequest::descriptor(), v1::JoinRequest::descriptor(),
+        v1::ListAnnotationsRequest::descriptor(), v1::GetMapRequest::descriptor(),
+        v1::GetGazeStateRequest::descriptor(), v1::PointRequest::descriptor(),
+        v1::WearerHello::descriptor(), v1::ListSceneRequest::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

@@ -85,7 +85,7 @@ const models: Record<Model, LensModel> = {
 
 export const toVec3 = (v: Vector3 | undefined): Vec3 => (v ? { x: v.x, y: v.y, z: v.z } : ZERO);
 
-function toRigid3(pb: PbRigid3 | undefined): Rigid3 {
+export function toRigid3(pb: PbRigid3 | undefined): Rigid3 {
   if (!pb?.rotation) return IDENTITY;
   const { x, y, z, w } = pb.rotation;
   return { rotation: { x, y, z, w }, translation: toVec3(pb.translationM) };

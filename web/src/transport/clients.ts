@@ -5,6 +5,7 @@ import { AnnotationService } from '../gen/saccade/v1/annotation_pb';
 import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
 import { PointerService } from '../gen/saccade/v1/pointer_pb';
+import { SceneService } from '../gen/saccade/v1/scene_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
 import { TalkService } from '../gen/saccade/v1/talk_pb';
 
@@ -14,6 +15,7 @@ export interface Clients {
   readonly map: Client<typeof MapService>;
   readonly gaze: Client<typeof GazeService>;
   readonly pointers: Client<typeof PointerService>;
+  readonly scene: Client<typeof SceneService>;
   readonly talk: Client<typeof TalkService>;
 }
 
@@ -27,6 +29,7 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
     map: createClient(MapService, transport),
     gaze: createClient(GazeService, transport),
     pointers: createClient(PointerService, transport),
+    scene: createClient(SceneService, transport),
     talk: createClient(TalkService, transport),
   };
 }

@@ -12,6 +12,7 @@ import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
 import type { PictureRect } from './pointer_layer';
 import { save, takeSnapshot } from './snapshot';
+import { SceneLayer } from './scene_layer';
 import { Still } from './still';
 import { crowdedWords, lostWords, pauseWords } from './words';
 
@@ -20,10 +21,13 @@ const STALE_MS = 1000;
 /** The live picture, or a frozen one, with the marks that belong to exactly that frame. */
 export class VideoPane extends Pane {
   private still: Still | undefined;
+  private readonly scene: SceneLayer;
 
   constructor(session: Session, player: Player, state: AppState, pictures: PictureCache) {
     const words = { className: 'video', label: 'Live video', title: 'Video' };
     super('video', words, [player.canvas], session, player, state, pictures);
+    this.scene = new SceneLayer(session);
+    player.canvas.after(this.scene.element);
   }
 
   get frozen(): boolean {
@@ -145,6 +149,7 @@ export class VideoPane extends Pane {
     this.painter.begin(this.size, layout);
     this.painter.clip(layout.width, layout.height);
     const current = this.current();
+    this.scene.draw(current?.view, this.player.canvas.style.transform);
     if (current?.view) this.drawFrame(current.facts, current.view);
     this.painter.end();
     this.took(performance.now() - begin);

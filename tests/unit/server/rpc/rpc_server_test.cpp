@@ -36,6 +36,10 @@ class ListBackend final : public Backend {
     intrinsics.fx = intrinsics.fy = 500;
     facts_.camera = std::make_shared<CameraModel>(intrinsics);
   }
+  std::shared_ptr<const Scene> scene() const override { return std::make_shared<const Scene>(); }
+  absl::Status SubmitScene(SceneCommand /*command*/) override {
+    return absl::UnavailableError("no scene");
+  }
   const ServerFacts& facts() const override { return facts_; }
   std::shared_ptr<const AnnotationList> annotations() const override {
     const std::lock_guard lock(mutex_);

@@ -21,6 +21,10 @@ using testing::MakeTracked;
 class Rest : public Backend {
  public:
   absl::Status Submit(Command) override { return absl::OkStatus(); }
+  std::shared_ptr<const Scene> scene() const override { return std::make_shared<const Scene>(); }
+  absl::Status SubmitScene(SceneCommand /*command*/) override {
+    return absl::UnavailableError("no scene");
+  }
   const ServerFacts& facts() const override { return facts_; }
   std::shared_ptr<const AnnotationList> annotations() const override {
     return std::make_shared<AnnotationList>();

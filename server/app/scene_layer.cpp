@@ -1,0 +1,49 @@
+#include "server/app/scene_layer.hpp"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+
+#include "server/app/scene_keeper.hpp"
+#include "shared/io/log.hpp"
+
+namespace saccade {
+namespace {
+
+// The edges of what hides: finer than the picture's own pixels, which the lens cuts anew.
+constexpr double kDrawnPerPixel = 2.0;
+
+}  // namespace
+
+cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
+                         const CameraModel& camera, const Rigid3& world_from_camera) {
+  const bool visible = std::any_of(
+      scene.objects.begin(), scene.objects.end(),
+      [](const SceneObject& object) { return object.material != SceneMaterial::kReal; });
+  const std::lock_guard lock(mutex_);
+  if (!visible || failed_) return {};
+  const auto give_up = [this](const absl::Status& why) {
+    failed_ = true;
+    view_ = nullptr;
+    Log(absl::StrCat("the scene is not drawn: ", why.message()));
+    return cv::Mat();
+  };
+  if (view_ == nullptr) {
+    absl::StatusOr<std::unique_ptr<SceneView>> made =
+        SceneView::Create(camera, backend_, kDrawnPerPixel);
+    if (!made.ok()) return give_up(made.status());
+    view_ = *std::move(made);
+  }
+  if (revision_ != scene.revision || moves_) {
+    absl::Status set = view_->SetMeshes(PlacedMeshes(scene, annotations));
+    if (!set.ok()) return give_up(set);
+    revision_ = scene.revision;
+    moves_ = std::any_of(scene.objects.begin(), scene.objects.end(),
+                         [](const SceneObject& one) { return one.parent != SceneParent::kWorld; });
+  }
+  absl::StatusOr<cv::Mat> drawn = view_->Draw(world_from_camera);
+  if (!drawn.ok()) return give_up(drawn.status());
+  return *std::move(drawn);
+}
+
+}  // namespace saccade

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+
+#include "server/gl/gl_context.hpp"
+#include "server/pipeline/events.hpp"
+#include "server/scene/scene_view.hpp"
+#include "shared/scene/annotation.hpp"
+#include "shared/scene/scene_object.hpp"
+
+namespace saccade {
+
+/// The scene as the augmented view shows it. Makes its view when there is first something to draw;
+/// where there can be none it says so once on stderr and draws nothing. Thread safe; who draws at
+/// the same time waits.
+class SceneLayer {
+ public:
+  explicit SceneLayer(GlBackend backend) : backend_(backend) {}
+
+  /// SceneView::Draw; empty where there is nothing to draw.
+  cv::Mat Draw(const Scene& scene, const AnnotationList& annotations, const CameraModel& camera,
+               const Rigid3& world_from_camera);
+
+ private:
+  const GlBackend backend_;
+  std::mutex mutex_;
+  std::unique_ptr<SceneView> view_;
+  bool failed_ = false;
+  std::uint64_t revision_ = 0;
+  bool moves_ = false;  // something is fixed to an annotation: uploaded each time
+};
+
+}  // namespace saccade

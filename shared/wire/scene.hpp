@@ -1,0 +1,19 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
+
+#include "saccade/v1/scene.pb.h"
+#include "shared/scene/scene_object.hpp"
+
+/// Scene objects to and from messages, as to_proto.hpp and from_proto.hpp.
+namespace saccade::wire {
+
+v1::SceneObject ToProto(const SceneObject& object);
+v1::SceneModelFacts ToProto(const SceneModel& model);
+
+/// Numbers are finite, enums known, ids UUIDs; sizes are the scene's to judge. `field` names the
+/// message in errors.
+absl::StatusOr<SceneObject> FromProto(const v1::SceneObject& message, absl::string_view field);
+
+}  // namespace saccade::wire

@@ -1,0 +1,116 @@
+import * as THREE from 'three';
+import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
+import { threeFromWorld, threeOrientation } from '../geometry/axes';
+import { compose, type Rigid3 } from '../geometry/rigid3';
+import type { Vec3 } from '../geometry/vec3';
+import type { Thing } from '../session/scene_book';
+
+/** What is real hides what is more than this behind it, along the optic axis [m]. */
+export const OCCLUSION_BIAS_M = 0.005;
+
+/**
+ * Depth alone, farther by the bias: written for z + bias rather than shifted in the depth buffer's own uneven
+ * steps, as on the server (shared/render/scene_painter.cpp).
+ */
+export const depthOnly = (): THREE.ShaderMaterial =>
+  new THREE.ShaderMaterial({
+    glslVersion: THREE.GLSL3,
+    side: THREE.DoubleSide,
+    colorWrite: false,
+    uniforms: { biasM: { value: OCCLUSION_BIAS_M } },
+    vertexShader: `
+      out float depth;
+      void main() {
+        vec4 eye = modelViewMatrix * vec4(position, 1.0);
+        depth = -eye.z;
+        gl_Position = projectionMatrix * eye;
+      }`,
+    fragmentShader: `
+      in float depth;
+      uniform float biasM;
+      uniform mat4 projectionMatrix;
+      void main() {
+        float z = depth + biasM;
+        float ndc = -projectionMatrix[2][2] + projectionMatrix[3][2] / z;
+        gl_FragDepth = clamp(0.5 * ndc + 0.5, 0.0, 1.0);
+      }`,
+  });
+
+const ORDER = { real: 0, virtual: 1, guide: 1, hidden: 2 } as const;
+
+/** Shaded by a light at the eye; what is hidden shows through everything. */
+function shaded(color: THREE.Color, hidden: boolean): THREE.Material {
+  return new THREE.MeshLambertMaterial({
+    color,
+    side: THREE.DoubleSide,
+    flatShading: true,
+    transparent: hidden,
+    opacity: hidden ? 0.65 : 1,
+    depthTest: !hidden,
+  });
+}
+
+function shapeGeometry(thing: Thing): THREE.BufferGeometry {
+  const { x, y, z } = thing.sizeM;
+  if (thing.shape === 'plane') return new THREE.PlaneGeometry(x, z).rotateX(-Math.PI / 2);
+  return new THREE.BoxGeometry(x, y, z).translate(0, y / 2, 0); // three.js: up is y
+}
+
+async function geometriesOf(
+  thing: Thing,
+  model: Uint8Array | undefined,
+): Promise<{ geometry: THREE.BufferGeometry; color: THREE.Color }[]> {
+  if (thing.shape !== 'model') {
+    const color = new THREE.Color(thing.colorRgba >>> 8);
+    return [{ geometry: shapeGeometry(thing), color }];
+  }
+  if (!model) return [];
+  const bytes = model.slice().buffer;
+  const { scene } = await new GLTFLoader().parseAsync(bytes, '');
+  scene.updateMatrixWorld(true);
+  const parts: { geometry: THREE.BufferGeometry; color: THREE.Color }[] = [];
+  scene.traverse((node) => {
+    if (!(node instanceof THREE.Mesh)) return;
+    const mesh = node as THREE.Mesh<THREE.BufferGeometry, THREE.Material>;
+    const { material } = mesh;
+    const color = 'color' in material ? (material.color as THREE.Color) : new THREE.Color(0xb4b4b4);
+    const geometry = mesh.geometry.clone().applyMatrix4(mesh.matrixWorld);
+    parts.push({ geometry: geometry.scale(thing.scale, thing.scale, thing.scale), color });
+  });
+  return parts;
+}
+
+/** A thing as three.js draws it, in its own frame; glTF's axes are three.js' own. */
+export async function meshesOf(thing: Thing, model: Uint8Array | undefined): Promise<THREE.Group> {
+  const group = new THREE.Group();
+  for (const { geometry, color } of await geometriesOf(thing, model)) {
+    const material =
+      thing.material === 'real' ? depthOnly() : shaded(color, thing.material === 'hidden');
+    const mesh = new THREE.Mesh(geometry, material);
+    mesh.renderOrder = ORDER[thing.material];
+    mesh.frustumCulled = false;
+    group.add(mesh);
+  }
+  return group;
+}
+
+/** Puts it where it is; `anchor`: the place of the annotation that it moves with, if it does. */
+export function pose(group: THREE.Group, thing: Thing, anchor: Vec3 | undefined): void {
+  group.visible = thing.annotationId === '' || anchor !== undefined;
+  const world: Rigid3 = anchor
+    ? compose({ rotation: { x: 0, y: 0, z: 0, w: 1 }, translation: anchor }, thing.parentFromObject)
+    : thing.parentFromObject;
+  const p = threeFromWorld(world.translation);
+  const q = threeOrientation(world);
+  group.position.set(p.x, p.y, p.z);
+  group.quaternion.set(q.x, q.y, q.z, q.w);
+}
+
+export function dispose(group: THREE.Group): void {
+  for (const child of group.children) {
+    if (!(child instanceof THREE.Mesh)) continue;
+    const mesh = child as THREE.Mesh<THREE.BufferGeometry, THREE.Material>;
+    mesh.geometry.dispose();
+    mesh.material.dispose();
+  }
+}
