@@ -48,6 +48,11 @@ enum class Command {
   kSay,
   kMessages,
   kPausePicture,
+  kSceneList,
+  kSceneAdd,
+  kScenePlace,
+  kSceneRemove,
+  kSceneRegister,
   kCameras,  // of this machine; asks no server
   kRecord,   // likewise
   kCalibrateCamera,
@@ -92,6 +97,12 @@ struct Options {
     std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them
     std::string board, square, lens;              // calibrate-camera
   } record;
+  struct Scene {
+    std::string model, shape, material, name, points;  // as typed
+    std::string size, at, push, gravity;               // X,Y,Z; empty: not given
+    std::optional<double> scale, yaw_deg;
+    bool with_scale = false, accept = false;
+  } scene;
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".
