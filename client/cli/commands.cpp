@@ -11,6 +11,7 @@
 #include <iostream>
 
 #include "client/cli/access_commands.hpp"
+#include "client/cli/scene_commands.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
 #include "client/cli/waiting_commands.hpp"
@@ -223,6 +224,12 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kMessages:
     case Command::kPausePicture:
       return RunTalk(options);
+    case Command::kSceneList:
+    case Command::kSceneAdd:
+    case Command::kScenePlace:
+    case Command::kSceneRemove:
+    case Command::kSceneRegister:
+      return RunScene(options);
     case Command::kCameras:
     case Command::kRecord:
     case Command::kCalibrateCamera:

@@ -13,6 +13,7 @@
 #include "client/cli/options.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/record_command.hpp"
+#include "client/cli/scene_commands.hpp"
 #include "client/cli/session_file.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
@@ -35,6 +36,7 @@ int Fail(const cli::Options& options, const absl::Status& problem) {
 absl::Status RunWithSession(cli::Options& options) {
   if (cli::IsAccessCommand(options.command)) return cli::RunAccess(options);
   if (absl::Status resolved = cli::ResolveAccess(options); !resolved.ok()) return resolved;
+  if (cli::IsSceneCommand(options.command)) return cli::RunScene(options);
   if (cli::IsTalkCommand(options.command)) return cli::RunTalk(options);
   net::ConnectionOptions& to = options.connection;
   // Watching is a session of its own; editing goes on in the one of the last run.

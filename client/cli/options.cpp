@@ -13,6 +13,7 @@
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/record_command.hpp"
+#include "client/cli/scene_commands.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
 #include "shared/version/version.hpp"
@@ -99,11 +100,19 @@ Command CommandOf(const CLI::App& app) {
       {"say", Command::kSay},
       {"messages", Command::kMessages},
       {"pause-picture", Command::kPausePicture},
+      {"scene list", Command::kSceneList},
+      {"scene add", Command::kSceneAdd},
+      {"scene place", Command::kScenePlace},
+      {"scene remove", Command::kSceneRemove},
+      {"scene register", Command::kSceneRegister},
       {"cameras", Command::kCameras},
       {"record", Command::kRecord},
       {"calibrate-camera", Command::kCalibrateCamera},
       {"print", Command::kPrintMarkers}};
   const CLI::App* chosen = app.get_subcommands().front();
+  if (chosen->get_name() == "scene") {  // its commands are called as others are
+    return commands.at(absl::StrCat("scene ", chosen->get_subcommands().front()->get_name()));
+  }
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());
 }
@@ -165,6 +174,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddCalibrateMount(app, options);
   AddAccess(app, options);
   AddTalk(app, options);
+  AddScene(app, options);
   AddMachine(app, options);
 
   try {

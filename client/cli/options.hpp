@@ -48,6 +48,11 @@ enum class Command {
   kSay,
   kMessages,
   kPausePicture,
+  kSceneList,
+  kSceneAdd,
+  kScenePlace,
+  kSceneRemove,
+  kSceneRegister,
   kCameras,  // of this machine; asks no server
   kRecord,   // likewise
   kCalibrateCamera,
@@ -96,6 +101,12 @@ struct Options {
   struct Markers {
     std::string family, ids, size, paper;  // print; as typed
   } markers;
+  struct Scene {
+    std::string model, shape, material, name, points;  // as typed
+    std::string size, at, push, gravity;               // X,Y,Z; empty: not given
+    std::optional<double> scale, yaw_deg;
+    bool with_scale = false, accept = false;
+  } scene;
 };
 
 /// `count` finite numbers separated by commas: "319.5,239.5".

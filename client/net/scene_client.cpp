@@ -1,0 +1,190 @@
+#include "client/net/scene_client.hpp"
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <utility>
+
+#include "client/net/channel.hpp"
+#include "client/net/convert.hpp"
+#include "saccade/v1/scene.grpc.pb.h"
+#include "saccade/v1/session.grpc.pb.h"
+#include "shared/wire/from_proto.hpp"
+#include "shared/wire/scene.hpp"
+#include "shared/wire/to_proto.hpp"
+
+namespace saccade::net {
+namespace {
+
+constexpr std::size_t kPiece = 200 * 1024;
+
+absl::StatusOr<ModelFacts> FromProto(const v1::SceneModelFacts& message) {
+  absl::StatusOr<Eigen::Vector3d> size = wire::FromProto(message.size_m(), "size_m");
+  if (!size.ok()) return size.status();
+  return ModelFacts{message.id(), message.name(), message.triangles(), message.bytes(), *size};
+}
+
+absl::StatusOr<Touch> FromProto(const v1::SceneContact& message) {
+  absl::StatusOr<Eigen::Vector3d> point =
+      wire::FromProto(message.point_in_world_m(), "point_in_world_m");
+  if (!point.ok()) return point.status();
+  return Touch{message.object_id(), message.object_name(), *point, message.moved_m()};
+}
+
+}  // namespace
+
+class SceneClient::Impl {
+ public:
+  explicit Impl(const ConnectionOptions& options)
+      : options_(options),
+        session_id_(options.session_id),
+        channel_(MakeChannel(options)),
+        session_(v1::SessionService::NewStub(channel_)),
+        scene_(v1::SceneService::NewStub(channel_)) {}
+
+  template <typename Stub, typename Request, typename Response>
+  absl::StatusOr<Response> Call(Stub& stub,
+                                grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                             Response*),
+                                const Request& request) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + options_.deadline);
+    Authorise(options_, context);
+    Response response;
+    const grpc::Status status = (stub.*method)(&context, request, &response);
+    if (!status.ok()) return Explain(options_, status);
+    return response;
+  }
+  template <typename Request, typename Response>
+  absl::StatusOr<Response> Ask(grpc::Status (v1::SceneService::Stub::*method)(grpc::ClientContext*,
+                                                                              const Request&,
+                                                                              Response*),
+                               Request request) {
+    request.set_session_id(session_id_);
+    return Call(*scene_, method, request);
+  }
+
+  absl::Status Join() {
+    v1::JoinRequest request;
+    request.set_display_name(options_.display_name);
+    request.set_role(ToProto(options_.role));
+    request.set_resume_session_id(session_id_);
+    const auto joined = Call(*session_, &v1::SessionService::Stub::Join, request);
+    if (!joined.ok()) return joined.status();
+    session_id_ = joined->session_id();
+    return absl::OkStatus();
+  }
+
+  const ConnectionOptions options_;
+  std::string session_id_;
+  const std::shared_ptr<grpc::Channel> channel_;
+  const std::unique_ptr<v1::SessionService::Stub> session_;
+  const std::unique_ptr<v1::SceneService::Stub> scene_;
+};
+
+SceneClient::SceneClient(const ConnectionOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
+SceneClient::~SceneClient() = default;
+
+absl::Status SceneClient::Join() { return impl_->Join(); }
+const std::string& SceneClient::session_id() const { return impl_->session_id_; }
+
+absl::StatusOr<SceneList> SceneClient::List() {
+  const auto answer = impl_->Ask(&v1::SceneService::Stub::ListScene, v1::ListSceneRequest());
+  if (!answer.ok()) return answer.status();
+  SceneList list;
+  list.revision = answer->revision();
+  for (const v1::SceneObject& message : answer->objects()) {
+    absl::StatusOr<SceneObject> object = wire::FromProto(message, "objects");
+    if (!object.ok()) return object.status();
+    list.objects.push_back(*std::move(object));
+  }
+  for (const v1::SceneModelFacts& message : answer->models()) {
+    absl::StatusOr<ModelFacts> model = FromProto(message);
+    if (!model.ok()) return model.status();
+    list.models.push_back(*std::move(model));
+  }
+  return list;
+}
+
+absl::StatusOr<SceneObject> SceneClient::Put(const SceneObject& object) {
+  v1::PutSceneObjectRequest request;
+  *request.mutable_object() = wire::ToProto(object);
+  const auto answer = impl_->Ask(&v1::SceneService::Stub::PutObject, request);
+  if (!answer.ok()) return answer.status();
+  return wire::FromProto(answer->object(), "object");
+}
+
+absl::Status SceneClient::Remove(const std::string& id) {
+  v1::RemoveSceneObjectRequest request;
+  request.set_id(id);
+  return impl_->Ask(&v1::SceneService::Stub::RemoveObject, request).status();
+}
+
+absl::StatusOr<PlacedThing> SceneClient::Place(const SceneObject& object,
+                                               const std::optional<Eigen::Vector3d>& push,
+                                               const std::optional<Eigen::Vector3d>& gravity) {
+  v1::PlaceSceneObjectRequest request;
+  *request.mutable_object() = wire::ToProto(object);
+  if (push) *request.mutable_push_in_world() = wire::ToProto(*push);
+  if (gravity) *request.mutable_gravity_in_world() = wire::ToProto(*gravity);
+  const auto answer = impl_->Ask(&v1::SceneService::Stub::PlaceObject, request);
+  if (!answer.ok()) return answer.status();
+  PlacedThing placed;
+  absl::StatusOr<SceneObject> at_rest = wire::FromProto(answer->object(), "object");
+  if (!at_rest.ok()) return at_rest.status();
+  placed.object = *std::move(at_rest);
+  absl::StatusOr<Touch> support = FromProto(answer->support());
+  if (!support.ok()) return support.status();
+  placed.support = *std::move(support);
+  if (!answer->has_stop()) return placed;
+  absl::StatusOr<Touch> stop = FromProto(answer->stop());
+  if (!stop.ok()) return stop.status();
+  placed.stop = *std::move(stop);
+  return placed;
+}
+
+absl::StatusOr<ModelFacts> SceneClient::Upload(const std::string& name, const std::string& glb,
+                                               const std::function<void(std::size_t)>& progress) {
+  if (glb.empty()) return absl::InvalidArgumentError("model: the file is empty");
+  v1::UploadModelRequest request;
+  request.set_upload_id(RandomUuid());
+  request.set_name(name);
+  request.set_total_bytes(static_cast<std::uint32_t>(glb.size()));
+  for (std::size_t offset = 0; offset < glb.size(); offset += kPiece) {
+    request.set_offset_bytes(static_cast<std::uint32_t>(offset));
+    request.set_data(glb.substr(offset, kPiece));
+    const auto answer = impl_->Ask(&v1::SceneService::Stub::UploadModel, request);
+    if (!answer.ok()) return answer.status();
+    progress(answer->received_bytes());
+    if (answer->has_model()) return FromProto(answer->model());
+  }
+  return absl::InternalError("the server did not say what it read");
+}
+
+absl::StatusOr<RegisteredThing> SceneClient::Register(
+    const std::string& id,
+    const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& object_and_world,
+    bool with_scale, bool accept) {
+  v1::RegisterSceneObjectRequest request;
+  request.set_id(id);
+  request.set_with_scale(with_scale);
+  request.set_accept(accept);
+  for (const auto& [in_object, in_world] : object_and_world) {
+    v1::SceneCorrespondence* one = request.add_correspondences();
+    *one->mutable_point_in_object_m() = wire::ToProto(in_object);
+    *one->mutable_point_in_world_m() = wire::ToProto(in_world);
+  }
+  const auto answer = impl_->Ask(&v1::SceneService::Stub::RegisterObject, request);
+  if (!answer.ok()) return answer.status();
+  absl::StatusOr<SceneObject> object = wire::FromProto(answer->object(), "object");
+  if (!object.ok()) return object.status();
+  return RegisteredThing{
+      *std::move(object),
+      answer->rms_mm(),
+      answer->left_out_rms_mm(),
+      {answer->errors_mm().begin(), answer->errors_mm().end()},
+      {answer->left_out_errors_mm().begin(), answer->left_out_errors_mm().end()}};
+}
+
+}  // namespace saccade::net

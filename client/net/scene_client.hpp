@@ -1,0 +1,74 @@
+#pragma once
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/net/connection.hpp"
+#include "shared/scene/scene_object.hpp"
+
+namespace saccade::net {
+
+struct ModelFacts {
+  std::string id, name;
+  std::uint32_t triangles = 0, bytes = 0;
+  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();
+};
+struct SceneList {
+  std::uint64_t revision = 0;
+  std::vector<SceneObject> objects;
+  std::vector<ModelFacts> models;
+};
+struct Touch {
+  std::string object_id, object_name;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
+  double moved_m = 0;
+};
+struct PlacedThing {
+  SceneObject object;
+  std::optional<Touch> stop;  // none: it was not pushed
+  Touch support;
+};
+struct RegisteredThing {
+  SceneObject object;
+  double rms_mm = 0, left_out_rms_mm = 0;
+  std::vector<double> errors_mm, left_out_errors_mm;
+};
+
+/// The scene of one server. Calls block, errors as of Connection.
+class SceneClient {
+ public:
+  explicit SceneClient(const ConnectionOptions& options);
+  ~SceneClient();
+
+  /// As TalkClient::Join: before every other call.
+  absl::Status Join();
+  const std::string& session_id() const;
+
+  absl::StatusOr<SceneList> List();
+  absl::StatusOr<SceneObject> Put(const SceneObject& object);
+  absl::Status Remove(const std::string& id);
+  absl::StatusOr<PlacedThing> Place(const SceneObject& object,
+                                    const std::optional<Eigen::Vector3d>& push,
+                                    const std::optional<Eigen::Vector3d>& gravity);
+  /// In pieces; `progress` is told the bytes that are there.
+  absl::StatusOr<ModelFacts> Upload(const std::string& name, const std::string& glb,
+                                    const std::function<void(std::size_t)>& progress);
+  absl::StatusOr<RegisteredThing> Register(
+      const std::string& id,
+      const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& object_and_world,
+      bool with_scale, bool accept);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace saccade::net
