@@ -71,6 +71,7 @@ struct TalkField {
   bool wanted = false;   // the field wants the keyboard
   bool carries = false;  // the selected mark goes with the message
   bool writing = false;  // has the keyboard
+  int field = 0;         // rises with each change from outside: ImGui keeps a copy of its own
   bool finish = false;   // Enter was pressed; what was typed before it may still be on its way
   std::string text;
   std::string problem;

@@ -42,11 +42,15 @@ void Desk::Say() {
     return;
   }
   talk.text.clear();
+  ++talk.field;
   talk.problem.clear();
   talk.carries = false;
   edits_.Say(text, mark, [this, text](const absl::StatusOr<std::string>& said) {
     if (said.ok()) return;
-    if (state_.talk.text.empty()) state_.talk.text = text;  // nothing that was typed is lost
+    if (state_.talk.text.empty()) {
+      state_.talk.text = text;  // nothing that was typed is lost
+      ++state_.talk.field;
+    }
     state_.talk.problem = absl::StrCat("Not said: ", said.status().message());
   });
 }

@@ -49,9 +49,11 @@ void DrawField(const PanelContext& context) {
   const float send = ImGui::CalcTextSize("Send").x + 4 * ImGui::GetStyle().FramePadding.x;
   ImGui::SetNextItemWidth(-send);
   if (std::exchange(talk.wanted, false)) ImGui::SetKeyboardFocusHere();
+  ImGui::PushID(talk.field);
   bool entered = ImGui::InputTextWithHint("##say", "Message (9)", &talk.text,
                                           ImGuiInputTextFlags_EnterReturnsTrue);
   talk.writing = ImGui::IsItemActive();
+  ImGui::PopID();
   entered = std::exchange(talk.finish, false) || entered;
   ImGui::SameLine();
   if (ImGui::Button("Send") || entered) {
