@@ -33,6 +33,7 @@ absl::StatusOr<std::unique_ptr<App>> App::Create(const Options& options, Setting
   auto window = view::Window::Open("Saccade", app->settings_.window);
   if (!window.ok()) return window.status();
   app->window_ = *std::move(window);
+  app->window_->SetLight(app->settings_.light);
   for (const Address& address : options.servers) {
     if (absl::Status added = app->AddTab(options, address); !added.ok()) return added;
   }
@@ -48,6 +49,7 @@ absl::Status App::AddTab(const Options& options, const Address& address) {
   Tab tab;
   tab.desk = std::make_unique<view::Desk>(std::move(session), address.server, &view::Window::Wake);
   tab.desk->state().main = settings_.main;
+  tab.desk->state().talk.open = settings_.layout.talk_open;
   tab.desk->state().my_name = settings_.name;
   tab.desk->keep_snapshot = [](const net::Still& still, const view::Desk& desk) {
     const auto file =
@@ -66,6 +68,7 @@ absl::Status App::AddTab(const Options& options, const Address& address) {
 Settings App::settings() const {
   Settings now = settings_;
   now.window = window_->place();
+  now.light = window_->light();
   now.main = tabs_.front().desk->state().main;
   return now;
 }
@@ -122,13 +125,28 @@ void App::HandleKey(const view::InputEvent& event, Timestamp now_ns) {
     help_ = false;
     return;
   }
+  const bool enters = event.key.key == "enter" && !event.repeat;
+  if (action == tools::Action::kEscape && desk.state().talk.writing) {
+    leave_field_ = true;
+    return;
+  }
   // A key pressed and let go between two pictures is none to ImGui.
-  if (event.key.key == "enter" && !event.repeat && desk.state().editor) {
+  if (enters && desk.state().dialog) {
+    const bool list = desk.state().dialog->shape == AnnotationShape::kCheckList;
+    desk.state().dialog->finish = event.key.ctrl || !list;  // else it is a new line
+    return;
+  }
+  if (enters && desk.state().talk.writing) {
+    desk.state().talk.finish = true;
+    return;
+  }
+  if (enters && desk.state().editor) {
     desk.state().editor->finish = desk.state().editor->opened;
     return;
   }
   // Letters are tools only where nobody writes.
-  if ((io.WantTextInput || desk.state().editor || help_) && action != tools::Action::kEscape) {
+  if ((io.WantTextInput || desk.state().editor || desk.state().dialog || help_) &&
+      action != tools::Action::kEscape) {
     if (help_ && action == tools::Action::kHelp) help_ = false;
     return;
   }
@@ -141,6 +159,10 @@ void App::HandleKey(const view::InputEvent& event, Timestamp now_ns) {
     help_ = true;
   } else if (action == tools::Action::kNextTab) {
     shown_ = (shown_ + 1) % tabs_.size();
+  } else if (*action == tools::Action::kTheme) {
+    window_->SetLight(!window_->light());
+  } else if (*action == tools::Action::kPaste) {
+    pointer_.Paste(layout_, desk, *tab().view, now_ns);
   } else {
     desk.Run(*action, now_ns);
   }
@@ -149,7 +171,9 @@ void App::HandleKey(const view::InputEvent& event, Timestamp now_ns) {
 absl::Status App::Draw(Timestamp now_ns) {
   if (absl::Status begun = window_->Begin(); !begun.ok()) return begun;
   if (trace_) trace_->Drawing();
+  if (std::exchange(leave_field_, false)) ImGui::SetWindowFocus(nullptr);
   tab().view->Update();
+  settings_.layout.talk_open = tab().desk->state().talk.open;
   layout_ = view::LayOut(window_->width(), window_->height(), window_->scale(), tabs_.size() > 1,
                          tab().view->aspect(), settings_.layout, corner_.corner());
   PlaceInset(now_ns);
@@ -197,9 +221,11 @@ void App::DrawPanels(Timestamp now_ns) {
   for (const Tab& each : tabs_) desks.push_back(each.desk.get());
   view::DrawTools(context, layout_.tools);
   view::DrawAnnotations(context, layout_.panel);
+  view::DrawTalk(context, layout_.talk);
   view::DrawGaze(context, layout_.gaze);
   view::DrawStrip(context, layout_.strip);
   view::DrawEditor(context, layout_.main);
+  view::DrawDialog(context, layout_.main);
   view::DrawHelp(context, help_);
   if (tabs_.size() > 1) shown_ = view::DrawTabs(desks, shown_, layout_.tabs, now_ns);
 }

@@ -53,7 +53,8 @@ class App {
   view::InsetCorner corner_;
   view::Pointer pointer_;
   bool help_ = false;
-  int busy_frames_ = 3;  // ImGui settles some pictures after the last input
+  bool leave_field_ = false;  // the one that has the keyboard
+  int busy_frames_ = 3;       // ImGui settles some pictures after the last input
 };
 
 }  // namespace saccade::app

@@ -44,6 +44,11 @@ void Read(TomlTable& table, Settings& settings) {
   table.Number("inset_share", 1, inset);
   table.Text("main", main);
   if (main != "map" && main != "video") table.Say("main", "is map or video");
+  std::string theme = settings.light ? "light" : "dark";
+  table.Text("theme", theme);
+  if (theme != "dark" && theme != "light") table.Say("theme", "is dark or light");
+  settings.light = theme == "light";
+  table.Boolean("talk_open", settings.layout.talk_open);
   settings.layout.panel_width = static_cast<float>(panel);
   settings.layout.inset_share = static_cast<float>(inset);
   settings.main = main == "map" ? view::Pane::kMap : view::Pane::kVideo;
@@ -87,10 +92,12 @@ absl::Status SaveSettings(const fs::path& file, const Settings& settings) {
   if (file.empty()) return absl::OkStatus();
   const std::string text = absl::StrFormat(
       "# What saccade-client keeps between two runs.\n[client]\nname = %s\nwidth = %d\nheight = "
-      "%d\nmaximised = %s\npanel_width = %.1f\ninset_share = %.3f\nmain = \"%s\"\n",
+      "%d\nmaximised = %s\npanel_width = %.1f\ninset_share = %.3f\nmain = \"%s\"\ntheme = "
+      "\"%s\"\ntalk_open = %s\n",
       Quoted(settings.name), settings.window.width, settings.window.height,
       settings.window.maximised ? "true" : "false", settings.layout.panel_width,
-      settings.layout.inset_share, settings.main == view::Pane::kMap ? "map" : "video");
+      settings.layout.inset_share, settings.main == view::Pane::kMap ? "map" : "video",
+      settings.light ? "light" : "dark", settings.layout.talk_open ? "true" : "false");
   if (Write(file, text)) return absl::OkStatus();
   return absl::UnavailableError(
       absl::StrCat("cannot keep the settings in ", file.string(), ": make that folder writable"));

@@ -17,6 +17,7 @@ struct Settings {
   view::Window::Place window;
   view::LayoutSettings layout;
   view::Pane main = view::Pane::kMap;
+  bool light = false;  // what stands round the panes
 
   absl::Status Validate() const;
 };

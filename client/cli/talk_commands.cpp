@@ -11,7 +11,6 @@
 #include "client/cli/session_file.hpp"
 #include "client/cli/text.hpp"
 #include "client/cli/waiting_commands.hpp"
-#include "client/net/talk_client.hpp"
 
 namespace saccade::cli {
 namespace {
@@ -41,7 +40,7 @@ void Print(const Options& options, const net::ChatMessage& message) {
   std::cout << (options.json ? Dump(ToJson(message)) : Line(message)) << std::endl;
 }
 
-absl::Status RunPause(const Options& options, net::TalkClient& client) {
+absl::Status RunPause(const Options& options, net::Connection& client) {
   const absl::StatusOr<net::PicturePause> state = client.PausePicture(options.pause);
   if (!state.ok()) return state.status();
   if (options.json) {
@@ -59,12 +58,12 @@ absl::Status RunPause(const Options& options, net::TalkClient& client) {
   return absl::OkStatus();
 }
 
-absl::Status RunMessages(const Options& options, net::TalkClient& client) {
+absl::Status RunMessages(const Options& options, net::Connection& client) {
   const auto print = [&options](const net::ChatMessage& message) {
     Print(options, message);
     return true;
   };
-  if (options.follow) return client.Follow(print);
+  if (options.follow) return client.FollowChat(print);
   const absl::StatusOr<std::vector<net::ChatMessage>> kept = client.Messages();
   if (!kept.ok()) return kept.status();
   for (const net::ChatMessage& message : *kept) print(message);
@@ -87,7 +86,7 @@ absl::StatusOr<std::string> FullId(const std::string& prefix, const Options& opt
       "'; 'saccade annotations' lists those there are"));
 }
 
-absl::Status RunSay(const Options& options, net::TalkClient& client) {
+absl::Status RunSay(const Options& options, net::Connection& client) {
   std::string mark;
   if (!options.id.empty()) {
     const absl::StatusOr<std::string> id = FullId(options.id, options);
@@ -129,8 +128,10 @@ absl::Status RunTalk(const Options& options) {
   const bool own = pauses || options.follow;  // a session of its own
   if (pauses) to.role = net::Role::kWearer;
   to.session_id = own ? "" : LoadSession(to.server, to.display_name);
-  net::TalkClient client(to);
-  if (absl::Status joined = client.Join(); !joined.ok()) return joined;
+  const auto made = net::Connection::Create(to);
+  if (!made.ok()) return made.status();
+  net::Connection& client = **made;
+  if (const auto joined = client.JoinAnew(); !joined.ok()) return joined.status();
   if (!own && client.session_id() != to.session_id) {
     SaveSession(to.server, to.display_name, client.session_id());
   }

@@ -86,11 +86,14 @@ class Connection {
   absl::StatusOr<std::uint64_t> ResetMap();
 
   /// `draft.request_id` is filled in if empty, so that a call made again creates nothing twice.
-  absl::StatusOr<Annotation> CreateAnnotation(AnnotationDraft draft);
-  absl::StatusOr<Annotation> UpdateAnnotation(const AnnotationPatch& patch);
+  /// `edit_group`: edits of one session with the same one, not empty, are undone together.
+  absl::StatusOr<Annotation> CreateAnnotation(AnnotationDraft draft,
+                                              const std::string& edit_group = "");
+  absl::StatusOr<Annotation> UpdateAnnotation(const AnnotationPatch& patch,
+                                              const std::string& edit_group = "");
   /// Page by page until there are no more.
   absl::StatusOr<std::vector<Annotation>> ListAnnotations();
-  absl::Status DeleteAnnotation(const std::string& id);
+  absl::Status DeleteAnnotation(const std::string& id, const std::string& edit_group = "");
   /// Ticks line `index` (from 0) of a check list off, or on again.
   absl::StatusOr<Annotation> TickCheckItem(const std::string& id, std::uint32_t index, bool done);
   /// The file that a picture was made of.
@@ -99,8 +102,17 @@ class Connection {
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();
 
-  /// Shows the others where one points; never stored.
-  absl::Status Point(const LaserWord& word);
+  /// Shows the others where one points, or a stroke while it grows; never stored.
+  absl::Status Point(const PointerWord& word);
+
+  /// Says it once, also if the call is made again. `annotation_id`: a mark to look at; empty: none.
+  absl::StatusOr<ChatMessage> Say(const std::string& text, const std::string& annotation_id);
+  /// What was said: the last 500, oldest first.
+  absl::StatusOr<std::vector<ChatMessage>> Messages();
+  /// What is kept and what follows, until `on_message` returns false (OK) or the server ends it.
+  absl::Status FollowChat(const std::function<bool(const ChatMessage&)>& on_message);
+  /// PermissionDenied: only the wearer does that.
+  absl::StatusOr<PicturePause> PausePicture(bool paused);
 
   GazeAnswer GetGaze();
   /// Asks for the lease, or renews it: at least every 200 ms, or it is gone.

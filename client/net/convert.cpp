@@ -91,21 +91,35 @@ std::vector<Participant> FromProto(const v1::PresenceEvent& message) {
   return participants;
 }
 
+PicturePause FromProto(const v1::PicturePause& message) {
+  return {message.paused(), message.by(), message.since_unix_ns()};
+}
+
+ChatMessage FromProto(const v1::ChatMessage& message) {
+  return {message.number(), message.participant_id(), message.display_name(),
+          message.text(),   message.annotation_id(),  message.sent_unix_ns()};
+}
+
+std::vector<ChatMessage> FromProto(
+    const google::protobuf::RepeatedPtrField<v1::ChatMessage>& messages) {
+  std::vector<ChatMessage> all;
+  for (const v1::ChatMessage& message : messages) all.push_back(FromProto(message));
+  return all;
+}
+
 absl::StatusOr<ServerStatus> FromProto(const v1::GetStatusResponse& message) {
   absl::StatusOr<MapSnapshot> pose = PoseOrNone(message.has_pose(), message.pose());
   if (!pose.ok()) return pose.status();
-  return ServerStatus{
-      .pose = *std::move(pose),
-      .statistics = FromProto(message.statistics()),
-      .participants = FromProto(message.presence()),
-      .map_features = message.map_features(),
-      .annotations = message.annotations(),
-      .source = message.source(),
-      .server_version = message.server_version(),
-      .uptime_s = message.uptime_s(),
-      .source_ended = message.source_ended(),
-      .picture_pause = {message.picture_pause().paused(), message.picture_pause().by(),
-                        message.picture_pause().since_unix_ns()}};
+  return ServerStatus{.pose = *std::move(pose),
+                      .statistics = FromProto(message.statistics()),
+                      .participants = FromProto(message.presence()),
+                      .map_features = message.map_features(),
+                      .annotations = message.annotations(),
+                      .source = message.source(),
+                      .server_version = message.server_version(),
+                      .uptime_s = message.uptime_s(),
+                      .source_ended = message.source_ended(),
+                      .picture_pause = FromProto(message.picture_pause())};
 }
 
 absl::StatusOr<MapState> FromProto(const v1::GetMapResponse& message) {

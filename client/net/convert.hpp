@@ -18,6 +18,10 @@ v1::AnnotationDraft ToProto(const AnnotationDraft& draft);
 
 Statistics FromProto(const v1::StatisticsEvent& message);
 std::vector<Participant> FromProto(const v1::PresenceEvent& message);
+PicturePause FromProto(const v1::PicturePause& message);
+ChatMessage FromProto(const v1::ChatMessage& message);
+std::vector<ChatMessage> FromProto(
+    const google::protobuf::RepeatedPtrField<v1::ChatMessage>& messages);
 absl::StatusOr<ServerStatus> FromProto(const v1::GetStatusResponse& message);
 absl::StatusOr<MapState> FromProto(const v1::GetMapResponse& message);
 absl::StatusOr<Still> FromProto(const v1::GetFrameResponse& message);

@@ -35,28 +35,27 @@ absl::StatusOr<MapChange> FromProto(const v1::MapDelta& message) {
   return change;
 }
 
-absl::StatusOr<std::vector<LaserPoint>> FromProto(const v1::PointerEvent& message) {
-  std::vector<LaserPoint> points;
+absl::StatusOr<std::vector<PointerNews>> FromProto(const v1::PointerEvent& message) {
+  std::vector<PointerNews> all;
   for (int i = 0; i < message.pointers_size(); ++i) {
     const v1::Pointer& pointer = message.pointers(i);
-    if (pointer.kind() != v1::POINTER_KIND_LASER) continue;
-    LaserPoint point{.participant_id = pointer.participant_id(),
+    PointerNews news{.participant_id = pointer.participant_id(),
                      .display_name = pointer.display_name(),
                      .stroke_id = pointer.stroke_id(),
+                     .sketch = pointer.kind() == v1::POINTER_KIND_SKETCH,
                      .color_rgba = pointer.color_rgba(),
+                     .first = pointer.first(),
+                     .points_in_world = {},
                      .released = pointer.released()};
-    if (pointer.points_in_world_m_size() > 0) {
-      const auto& newest = pointer.points_in_world_m(pointer.points_in_world_m_size() - 1);
+    for (const v1::Vector3& point : pointer.points_in_world_m()) {
       absl::StatusOr<Eigen::Vector3d> at =
-          wire::FromProto(newest, absl::StrCat("pointer.pointers[", i, "].points_in_world_m"));
+          wire::FromProto(point, absl::StrCat("pointer.pointers[", i, "].points_in_world_m"));
       if (!at.ok()) return at.status();
-      point.point_in_world = *at;
-    } else if (!point.released) {
-      continue;
+      news.points_in_world.push_back(*at);
     }
-    points.push_back(std::move(point));
+    if (!news.points_in_world.empty() || news.released) all.push_back(std::move(news));
   }
-  return points;
+  return all;
 }
 
 }  // namespace
@@ -78,7 +77,8 @@ class Stream::Impl {
     request.set_video_view(v1::VIDEO_VIEW_RAW);
     for (const v1::Topic topic :
          {v1::TOPIC_POSE, v1::TOPIC_MAP, v1::TOPIC_VIDEO, v1::TOPIC_ANNOTATION, v1::TOPIC_GAZE,
-          v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS, v1::TOPIC_POINTER}) {
+          v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS, v1::TOPIC_POINTER, v1::TOPIC_CHAT,
+          v1::TOPIC_PICTURE_PAUSE}) {
       request.add_topics(topic);
     }
     const auto reader = stub_->Subscribe(&context_, request);
@@ -134,6 +134,10 @@ class Stream::Impl {
         return Wrap(wire::FromProto(message.gaze(), "gaze"));
       case v1::Event::kPointer:
         return Wrap(FromProto(message.pointer()));
+      case v1::Event::kChat:
+        return std::optional<StreamEvent>(net::FromProto(message.chat().messages()));
+      case v1::Event::kPicturePause:
+        return std::optional<StreamEvent>(net::FromProto(message.picture_pause()));
       case v1::Event::kStatistics:
         return std::optional<StreamEvent>(net::FromProto(message.statistics()));
       case v1::Event::kPresence:

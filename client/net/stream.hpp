@@ -56,18 +56,20 @@ struct MapChange {
   std::vector<FeatureId> removed_ids;
 };
 
-/// Where somebody points right now; the newest point of it.
-struct LaserPoint {
+/// Where somebody points right now, or what is new of a stroke that they draw.
+struct PointerNews {
   std::string participant_id, display_name, stroke_id;
+  bool sketch = false;
   std::uint32_t color_rgba = 0xffffffff;
-  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
+  std::size_t first = 0;                         // place of points_in_world[0] in the stroke
+  std::vector<Eigen::Vector3d> points_in_world;  // [m]; of a laser its newest alone
   bool released = false;
-  Timestamp heard_ns = 0;  // this machine's clock
 };
 
 using StreamEvent =
     std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange, GazeSnapshot, Statistics,
-                 std::vector<Participant>, std::vector<LaserPoint>, SourceEnd>;
+                 std::vector<Participant>, std::vector<PointerNews>, std::vector<ChatMessage>,
+                 PicturePause, SourceEnd>;
 
 /// Times of one Ping [ns]: `sent` and `answered` on this machine's clock, the others on the
 /// server's.

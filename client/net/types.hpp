@@ -43,6 +43,14 @@ struct PicturePause {
   std::int64_t since_unix_ns = 0;
 };
 
+/// One line of the conversation.
+struct ChatMessage {
+  std::uint64_t number = 0;  // from 1, rises while the server runs
+  std::string participant_id, display_name, text;
+  std::string annotation_id;  // a mark to look at; empty: it carries none
+  std::int64_t sent_unix_ns = 0;
+};
+
 struct ServerStatus {
   MapSnapshot pose;  // of the newest frame, without features
   Statistics statistics;
@@ -104,10 +112,11 @@ struct SourceEnd {
   std::uint64_t frames = 0;
 };
 
-/// A laser pointer as it is sent: a point now, or its end.
-struct LaserWord {
+/// A laser pointer or a growing stroke as it is sent: what is new of it, or its end.
+struct PointerWord {
   std::string stroke_id;  // UUID of ours
-  AnnotationTarget target;
+  bool sketch = false;    // a stroke, whose points come in their order; else a laser
+  std::vector<AnnotationTarget> targets;  // at most 64
   bool released = false;
   std::uint32_t color_rgba = 0xffffffff;
 };

@@ -25,14 +25,23 @@ class Edits {
     std::optional<AnnotationTarget> later;
     /// Where it seems to land, shown until the server answers [m].
     std::optional<Eigen::Vector3d> guess_in_world;
+    /// Edits with the same one, not empty, are undone together.
+    std::string edit_group{};
   };
   void Place(Placement placement, Done done);
-  void Update(AnnotationPatch patch, Done done);
-  void Remove(const std::string& id, Done done);
+  void Update(AnnotationPatch patch, Done done, const std::string& edit_group = "");
+  void Remove(const std::string& id, Done done, const std::string& edit_group = "");
+  /// Ticks line `index` (from 0) of a check list off, or on again.
+  void Tick(const std::string& id, std::uint32_t index, bool tick, Done done);
   void Undo(Done done);
   void Redo(Done done);
   void ResetMap(Done done);
-  void Point(net::LaserWord word, Done done);
+  void Point(net::PointerWord word, Done done);
+  /// `annotation_id`: a mark to look at; empty: none.
+  void Say(const std::string& text, const std::string& annotation_id, Done done);
+  /// The file that a picture was made of.
+  void FetchPicture(const std::string& id,
+                    std::function<void(const absl::StatusOr<Picture>&)> done);
   /// A still of a frame of the last 10 s.
   void FetchStill(FrameId frame_id, net::VideoView view,
                   std::function<void(const absl::StatusOr<net::Still>&)> done);

@@ -9,7 +9,6 @@ namespace {
 
 constexpr double kPathSpacingM = 0.005;
 constexpr std::size_t kMaxPath = 4000;
-constexpr Timestamp kLaserNs = 1'000'000'000;
 
 }  // namespace
 
@@ -18,6 +17,7 @@ void State::Begin(const std::string& id, const net::Joined& told) {
   joined = told;
   source_ended = false;
   gaze.reset();
+  pointers.Clear();
   clock.Reset();
   path.clear();
   ++path_version;
@@ -41,13 +41,12 @@ void State::Apply(const net::StreamEvent& event, Timestamp now_ns) {
           statistics = value;
         } else if constexpr (std::is_same_v<T, std::vector<net::Participant>>) {
           participants = value;
-        } else if constexpr (std::is_same_v<T, std::vector<net::LaserPoint>>) {
-          for (const net::LaserPoint& point : value) {
-            lasers.erase(point.stroke_id);
-            if (point.released || point.participant_id == joined.participant_id) continue;
-            lasers[point.stroke_id] = point;
-            lasers[point.stroke_id].heard_ns = now_ns;
-          }
+        } else if constexpr (std::is_same_v<T, std::vector<net::PointerNews>>) {
+          pointers.Apply(value, joined.participant_id, now_ns);
+        } else if constexpr (std::is_same_v<T, std::vector<net::ChatMessage>>) {
+          chat.Add(value);
+        } else if constexpr (std::is_same_v<T, net::PicturePause>) {
+          pause = value.paused ? std::optional(value) : std::nullopt;
         } else if constexpr (std::is_same_v<T, net::SourceEnd>) {
           source_ended = true;
         }
@@ -74,12 +73,6 @@ void State::Take(const net::MapChange& change) {
   for (const FeatureSnapshot& feature : change.upserted) features[feature.id] = feature;
   for (const FeatureId id : change.removed_ids) features.erase(id);
   ++map_version;
-}
-
-bool State::Expire(Timestamp now_ns) {
-  return std::erase_if(lasers, [now_ns](const auto& entry) {
-           return now_ns - entry.second.heard_ns > kLaserNs;
-         }) > 0;
 }
 
 std::optional<Timestamp> State::Age(Timestamp now_ns) const {

@@ -7,7 +7,9 @@
 
 #include "client/net/stream.hpp"
 #include "client/session/annotation_book.hpp"
+#include "client/session/chat_book.hpp"
 #include "client/session/clock.hpp"
+#include "client/session/pointer_book.hpp"
 
 namespace saccade::session {
 
@@ -45,8 +47,11 @@ class State {
   std::vector<net::Participant> participants;
   std::optional<net::Statistics> statistics;
   std::optional<GazeSnapshot> gaze;
-  /// Who points where now, by stroke; their own are not among them.
-  std::map<std::string, net::LaserPoint> lasers;
+  /// The wearer's large pause: nobody is shown a picture. Nothing: pictures are shown. Over a lost
+  /// connection as it was last told.
+  std::optional<net::PicturePause> pause;
+  ChatBook chat;
+  PointerBook pointers;
   AnnotationBook annotations;
   ClockOffset clock;
   // The map; `map_version` rises with every change of it.
@@ -57,8 +62,8 @@ class State {
   std::uint64_t path_version = 0;
 
   bool metric() const { return pose && pose->metric; }
-  /// Forgets lasers that nothing was heard of for a second; true if there were any.
-  bool Expire(Timestamp now_ns);
+  /// Forgets pointers of others that nothing was heard of; true if there were any.
+  bool Expire(Timestamp now_ns) { return pointers.Expire(now_ns); }
   /// How old everything shown is [ns]; nothing while it is live, and before the first of it.
   std::optional<Timestamp> Age(Timestamp now_ns) const;
 

@@ -122,7 +122,8 @@ absl::Status Session::Threads::RunOnce(std::stop_token stop, bool& was_live) {
   pictures_.Reset();
   Post([id = *id, joined = (*joining)->joined()](State& state) { state.Begin(id, joined); });
   return stream->Read([&](std::uint64_t sequence, std::optional<net::StreamEvent> event) {
-    was_live = true;
+    // Once the stream is open: between its first word and this answer nothing falls.
+    if (!std::exchange(was_live, true)) AskForHistory();
     const Timestamp now_ns = MonotonicNow();
     if (event && std::holds_alternative<net::CodedPicture>(*event)) {
       pictures_.Push(std::get<net::CodedPicture>(*std::move(event)));
@@ -184,6 +185,14 @@ absl::Status Session::Threads::Ask(Request request) {
   requests_.push_back(std::move(request));
   changed_.notify_all();
   return absl::OkStatus();
+}
+
+void Session::Threads::AskForHistory() {
+  Ask([](net::Connection& connection) -> Answer {
+    return [kept = connection.Messages()](State& state) {
+      if (kept.ok()) state.chat.History(*kept);  // what breaks it breaks the stream as well
+    };
+  }).IgnoreError();
 }
 
 void Session::Threads::RunEdits(std::stop_token stop) {

@@ -31,6 +31,8 @@ class Session::Threads {
   void RunKeeper(std::stop_token stop);
   void Tick();
   void RunEdits(std::stop_token stop);
+  /// What was said before.
+  void AskForHistory();
   void Post(Answer answer);
   void SetLink(Link::Kind kind, std::string reason = "");
   bool SleepFor(std::stop_token stop, std::chrono::milliseconds time);

@@ -11,27 +11,33 @@ using enum Group;
 
 constexpr auto kControls = std::to_array<Control>({
     {kSelect, kTool, "Select", "v", "V",
-     "click a mark to select it; drag a selected one to move it"},
+     "click a mark to select it, Shift for several; drag a selected one to move it"},
     {kLaser, kTool, "Laser pointer", "w", "W",
      "press and move: the others see where you point, until you let go"},
-    {kInk, kTool, "Ink", "i", "I", "press and draw a stroke in the video"},
+    {kInk, kTool, "Ink", "i", "I", "press and draw in the video: everybody sees the stroke grow"},
     {kCube, kTool, "Cube", "c", "C", "click to place a cube, 5 cm where the scale is known"},
     {kBox, kTool, "Box", "b", "B", "click to place a box, 10 cm where the scale is known"},
     {kNote, kTool, "Note", "n", "N", "click to place a note, then type"},
     {kArrow, kTool, "Arrow", "a", "A", "click to place an arrow"},
     {kPin, kTool, "Pin", "1", "1", "click to place a pin: the next number is its own"},
     {kMeasure, kTool, "Distance", "d", "D", "click both ends: the length, and how sure it is"},
+    {kCheckList, kTool, "Check list", "j", "J", "click its place, then write what is to be done"},
+    {kPicture, kTool, "Picture", "u", "U",
+     "click its place, then name a PNG or JPEG; or drop a file there"},
     {kGaze, kTool, "Look", "g", "G", "click what the camera should look at and hold"},
     {kUndo, kCommand, "Undo", "z", "Z", "take back your last change"},
     {kRedo, kCommand, "Redo", "y", "Y", "do it again"},
-    {kDelete, kCommand, "Delete", "delete", "Del", "delete the selected mark"},
+    {kDelete, kCommand, "Delete", "delete", "Del", "delete the selected marks"},
+    {kCopy, kCommand, "Copy", "ctrl+c", "^C", "copy the selected marks (Ctrl C)"},
+    {kPaste, kCommand, "Paste", "ctrl+v", "^V",
+     "put the copied marks where the pointer is, in the map or the video (Ctrl V)"},
     {kLock, kCommand, "Lock", "3", "3",
      "only you and the wearer change a locked mark; again: unlock"},
     {kFreeze, kCommand, "Freeze", "p", "P", "hold the picture and click in it; again: go on"},
     {kSwap, kCommand, "Swap", "s", "S", "swap the map and the video"},
     {kFollow, kCommand, "Follow", "f", "F", "keep the wearer in view"},
     {kWholeMap, kCommand, "Whole map", "h", "H", "bring the whole map into view"},
-    {kTop, kCommand, "From above", "8", "8", "look at the map from above"},
+    {kTop, kCommand, "From above", "4", "4", "look at the map from above"},
     {kReset, kCommand, "Reset map", "r", "R", "forget the map and start anew"},
     {kStop, kHead, "Stop", "x", "X", "stop the head where it is"},
     {kHome, kHead, "Ahead", "0", "0", "look straight ahead (home)"},
@@ -43,6 +49,8 @@ constexpr auto kControls = std::to_array<Control>({
     {kHideMarks, kMarks, "Hide", "m", "M", "draw no marks; again: all"},
     {kSnapshot, kMarks, "Snapshot", "k", "K", "keep the picture with its marks as a PNG"},
     {kFind, kKeys, "Find", "/", "/", "find marks by text, shape, author"},
+    {kMessage, kKeys, "Message", "9", "9", "write a message to everybody there"},
+    {kTheme, kKeys, "Light", "5", "5", "a light window; again: a dark one"},
     {kHelp, kKeys, "Help", "?", "?", "what the keys do"},
     {kEscape, kKeys, "Leave", "escape", "Esc", "leave what is under way"},
     {kNextTab, kKeys, "Next wearer", "ctrl+tab", "^Tab", "show the next server's tab"},
@@ -62,7 +70,9 @@ std::optional<Action> ActionOf(const KeyPress& press) {
   if (press.ctrl || press.super) {
     if (press.key == "z") return press.shift ? kRedo : kUndo;
     if (press.key == "y") return kRedo;
-    if (press.key == "tab") return kNextTab;
+    for (const Control& control : kControls) {
+      if (control.key == "ctrl+" + press.key) return control.action;
+    }
     return std::nullopt;
   }
   if (press.key == "backspace") return kDelete;
@@ -84,6 +94,10 @@ std::optional<AnnotationShape> ShapeOf(Action tool) {
       return AnnotationShape::kPin;
     case kMeasure:
       return AnnotationShape::kMeasure;
+    case kCheckList:
+      return AnnotationShape::kCheckList;
+    case kPicture:
+      return AnnotationShape::kPicture;
     case kNote:
       return AnnotationShape::kNote;
     case kArrow:

@@ -20,11 +20,15 @@ enum class Action {
   kArrow,
   kPin,
   kMeasure,
+  kCheckList,
+  kPicture,
   kGaze,
   // What happens at once.
   kUndo,
   kRedo,
   kDelete,
+  kCopy,
+  kPaste,
   kLock,
   kFreeze,
   kSwap,
@@ -45,6 +49,8 @@ enum class Action {
   kSnapshot,
   // Keys alone.
   kFind,
+  kMessage,
+  kTheme,
   kHelp,
   kEscape,
   kNextTab,
@@ -55,7 +61,7 @@ struct Control {
   Action action;
   Group group;
   const char* label;
-  const char* key;    // lower case letter, digit, or "delete", "escape", "ctrl+tab"
+  const char* key;    // lower case letter, digit, "delete", "escape"; after "ctrl+" with Ctrl
   const char* shown;  // on the button
   const char* hint;
 };

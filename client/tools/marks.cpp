@@ -60,6 +60,12 @@ const char* ShapeWord(AnnotationShape shape) {
   return shape == AnnotationShape::kInk ? "stroke" : ToString(shape);
 }
 
+std::string TitleOf(const Annotation& annotation) {
+  const char* shape = ShapeWord(annotation.shape);
+  if (annotation.text.empty()) return absl::StrCat("the ", shape);
+  return absl::StrCat(shape, " “", annotation.text.substr(0, annotation.text.find('\n')), "”");
+}
+
 void InkLine::Begin(FrameId frame_id, const Eigen::Vector2d& pixel) {
   frame_id_ = frame_id;
   points_ = {pixel};

@@ -36,6 +36,8 @@ bool Passes(const Annotation& annotation, const MarkFilter& filter, const std::s
 
 /// "cube", "note", "stroke", "check list".
 const char* ShapeWord(AnnotationShape shape);
+/// What a mark is called in a line: "note “oil”", "the cube".
+std::string TitleOf(const Annotation& annotation);
 
 /// A stroke while it is drawn, in the picture of one frame: points nearer than 2 px to the last one
 /// are left out, each is smoothed with its neighbours, at most 2000 are kept.

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 namespace saccade::tools {
 namespace {
@@ -88,6 +89,7 @@ StatusWords StatusOf(const session::State& state, Timestamp now_ns) {
       break;
   }
   if (state.source_ended) return {"■", "recording ended", "the last picture and map stay", false};
+  if (state.pause) return {"■", "picture paused", "the map stays live", false};
   if (state.pose && now_ns - state.pose_ns > kNoPictureNs) {
     return {"○", absl::StrCat("no picture for ", SpanWords(now_ns - state.pose_ns)),
             "the camera sends none: a phone may be away, or without network", true};
@@ -103,6 +105,18 @@ std::string LostWords(const session::State& state) {
   const StatusWords words = Tracking(state.pose);
   return absl::StrCat(words.text == "lost" ? "Lost" : "Searching its place", ": ", words.advice,
                       ". Marks come back with it");
+}
+
+std::string ClockWords(std::int64_t unix_ns) {
+  const std::time_t seconds = unix_ns / 1'000'000'000;
+  std::tm local{};
+  localtime_r(&seconds, &local);
+  return absl::StrFormat("%02d:%02d", local.tm_hour, local.tm_min);
+}
+
+std::string PauseWords(const net::PicturePause& pause) {
+  return absl::StrCat(Or(pause.by, "The wearer"), " paused the picture at ",
+                      ClockWords(pause.since_unix_ns), "; the map stays live");
 }
 
 std::string PresenceWords(const std::vector<net::Participant>& participants) {

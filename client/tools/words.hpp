@@ -21,6 +21,11 @@ StatusWords StatusOf(const session::State& state, Timestamp now_ns);
 /// Over the picture of a camera that does not know where it is; empty otherwise.
 std::string LostWords(const session::State& state);
 
+/// "Ann paused the picture at 12:03; the map stays live".
+std::string PauseWords(const net::PicturePause& pause);
+/// "12:03", where this machine is.
+std::string ClockWords(std::int64_t unix_ns);
+
 /// "2 experts, 1 wearer".
 std::string PresenceWords(const std::vector<net::Participant>& participants);
 

@@ -9,6 +9,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "client/tools/words.hpp"
+
 namespace saccade::view {
 namespace {
 
@@ -36,6 +38,7 @@ Desk::News Desk::Poll(Timestamp now_ns) {
   changed = pilot_.Check() || changed;
   // Held still it is said again: after a second without a word it would be gone.
   if (!laser_id_.empty() && now_ns - pointed_ns_ > kSayAgainNs) PointAt(pointed_at_, false);
+  TellSketches(now_ns);
   changed = state_.Expire(now_ns) || changed;
   changed = session().Expire(now_ns) || changed;
   // A still of a map that is gone shows marks where they are not.
@@ -54,7 +57,8 @@ const decode::Picture* Desk::shown() const {
 
 std::optional<tools::View> Desk::video_view() const {
   const decode::Picture* picture = shown();
-  if (picture == nullptr || !session::IsPlaced(picture->facts->pose)) return std::nullopt;
+  if (picture == nullptr || picture_paused() || !session::IsPlaced(picture->facts->pose))
+    return std::nullopt;
   return tools::View(picture->facts->camera, picture->facts->pose->world_from_camera);
 }
 
@@ -126,9 +130,16 @@ void Desk::Shown(Timestamp shown_ns) {
   }
 }
 
+std::string Desk::WhyNoPicture() const {
+  if (session().pause) return absl::StrCat(tools::PauseWords(*session().pause), ".");
+  return shown() == nullptr ? "There is no picture yet." : "";
+}
+
 void Desk::Freeze(Timestamp now_ns) {
   if (state_.still) return state_.still.reset();
-  if (!live_) return state_.Refuse("Freeze", "There is no picture yet.", now_ns);
+  if (const std::string why = WhyNoPicture(); !why.empty()) {
+    return state_.Refuse("Freeze", why, now_ns);
+  }
   state_.still = Still{*live_, session().features, session().map_revision, now_ns, false};
   const FrameId id = live_->facts->frame_id;
   // The same picture as the server kept it: without what the coder lost, where it kept it whole.
@@ -147,9 +158,10 @@ void Desk::Freeze(Timestamp now_ns) {
 
 /// The server draws the marks in, as for the wearer.
 void Desk::Snapshot(Timestamp now_ns) {
-  const decode::Picture* picture = shown();
-  if (picture == nullptr) return state_.Refuse("Snapshot", "There is no picture yet.", now_ns);
-  const FrameId id = picture->facts->frame_id;
+  if (const std::string why = WhyNoPicture(); !why.empty()) {
+    return state_.Refuse("Snapshot", why, now_ns);
+  }
+  const FrameId id = shown()->facts->frame_id;
   edits_.FetchStill(
       id, net::VideoView::kAugmented, [this](const absl::StatusOr<net::Still>& still) {
         const std::string words = still.ok()
@@ -162,10 +174,13 @@ void Desk::Snapshot(Timestamp now_ns) {
 void Desk::Escape() {
   if (state_.editor) {
     state_.editor.reset();
+  } else if (state_.dialog) {
+    state_.dialog.reset();
   } else if (state_.measure_from) {
     state_.measure_from.reset();
   } else if (state_.ink.drawing()) {
     state_.ink.Cancel();
+    EndSketch();
   } else if (moving_) {
     moving_.reset();
     dragged_to_.reset();
@@ -176,7 +191,7 @@ void Desk::Escape() {
   } else if (state_.still) {
     state_.still.reset();
   } else {
-    state_.selected_id.clear();
+    state_.selection.Clear();
   }
 }
 
@@ -198,8 +213,9 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
     case kRedo:
       return edits_.Redo(Tell(control.label));
     case kDelete:
-      if (!state_.selected_id.empty()) return Remove(state_.selected_id, now_ns);
-      return state_.Refuse(control.label, "Select a mark first.", now_ns);
+      return RemoveSelected(now_ns);
+    case kCopy:
+      return Copy(now_ns);
     case kLock:
       return Lock(now_ns);
     case kFreeze:
@@ -231,6 +247,9 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
       return Snapshot(now_ns);
     case kFind:
       state_.find = true;
+      return;
+    case kMessage:
+      state_.talk.open = state_.talk.wanted = true;
       return;
     case kEscape:
       return Escape();

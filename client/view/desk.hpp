@@ -4,11 +4,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/decode/player.hpp"
 #include "client/session/edits.hpp"
 #include "client/session/gaze_pilot.hpp"
 #include "client/session/latency.hpp"
+#include "client/session/pointing.hpp"
 #include "client/session/session.hpp"
 #include "client/tools/orbit.hpp"
 #include "client/tools/view.hpp"
@@ -51,6 +53,8 @@ class Desk {
   const std::optional<decode::Picture>& live() const { return live_; }
   /// The one that the video pane shows: the still, or the live one.
   const decode::Picture* shown() const;
+  /// The wearer lets nobody see a picture: none of the last one stays, but for a still.
+  bool picture_paused() const { return session().pause.has_value() && !state_.still; }
   /// The view of that picture; nothing while its place is not known.
   std::optional<tools::View> video_view() const;
   /// The eye above the map, for a pane of this size.
@@ -67,16 +71,37 @@ class Desk {
   void Run(tools::Action action, Timestamp now_ns);
   void Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px);
   void Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view);
-  /// `moved`: the pointer was dragged; `x`, `y`: in the window.
-  void Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, bool moved,
-               float x, float y, Timestamp now_ns);
+  /// How the button came up: whether the pointer was dragged, where it is in the window, and
+  /// whether Shift adds to what is selected.
+  struct Lift {
+    bool moved = false;
+    float x = 0, y = 0;
+    bool adds = false;
+  };
+  void Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, const Lift& lift,
+               Timestamp now_ns);
   void HoverAt(Pane pane, const std::optional<Eigen::Vector2d>& pixel, const tools::View* view,
                double pick_px);
   /// The map was moved by hand: it frames itself no more.
   void Hold() { held_ = true; }
-  void Select(const std::string& id);
+  /// `adds`: to those that are selected.
+  void Select(const std::string& id, bool adds = false);
+  /// Selects it, and brings it before the eye of the map.
+  void Show(const std::string& id);
   void Remove(const std::string& id, Timestamp now_ns);
-  void Paint(std::uint32_t color_rgba, Timestamp now_ns);
+  /// Of new marks, and of those selected.
+  void Paint(std::uint32_t color_rgba);
+  void Tick(const std::string& id, std::uint32_t index, bool done);
+  /// Copied marks go where the pointer of that pane is; nothing there: it says why.
+  void Paste(Pane pane, const std::optional<Eigen::Vector2d>& pixel, const tools::View* view,
+             Timestamp now_ns);
+  /// A file was dropped there: placed as a picture.
+  void DropFile(const std::string& file, Pane pane, const Eigen::Vector2d& pixel,
+                const tools::View* view, Timestamp now_ns);
+  /// Places what the dialog has, or says in it what cannot be kept; false: drops it.
+  void FinishDialog(bool keep);
+  /// Says what is in the field, with the selected mark if it is to go with it.
+  void Say();
   void LookAtMark(const std::string& id, const Where& where, Timestamp now_ns);
   void EditText(const std::string& id, float x, float y);
   /// Sends or drops what was written.
@@ -95,8 +120,22 @@ class Desk {
   std::optional<tools::Landing> LandingAt(Pane pane, const Eigen::Vector2d& pixel,
                                           const tools::View* view) const;
   std::string WhyNoLanding(Pane pane) const;
+  /// Why it cannot be frozen or kept; empty: it can.
+  std::string WhyNoPicture() const;
   std::vector<Annotation> Drawn() const;
+  /// The selected marks; a change of several is one step of undo.
+  std::vector<Annotation> Selected() const;
   void Lock(Timestamp now_ns);
+  void RemoveSelected(Timestamp now_ns);
+  void Copy(Timestamp now_ns);
+  /// What is to be placed for a copy; for a picture once its file was fetched.
+  void DraftOf(const CopiedMark& copy,
+               std::function<void(const absl::StatusOr<AnnotationDraft>&)> done);
+  void PutCopies(const tools::Landing& landing);
+  void PutOthers(const std::vector<CopiedMark>& others, const Eigen::Vector3d& from,
+                 const std::string& group, const Where& where);
+  void MoveSelected(const std::string& grabbed, const tools::Landing& landing, const Where& where);
+  void PlaceDraft(AnnotationDraft draft, const tools::Landing& landing, const Where& where);
   void Freeze(Timestamp now_ns);
   void Snapshot(Timestamp now_ns);
   void Escape();
@@ -139,6 +178,11 @@ class Desk {
   Timestamp pointed_ns_ = 0;
   AnnotationTarget pointed_at_;
   void PointAt(const AnnotationTarget& target, bool released);
+  std::shared_ptr<session::Pointing> sketch_;  // the stroke under way, for the others
+  std::vector<std::shared_ptr<session::Pointing>> sketches_;  // until their end was sent
+  void BeginSketch();
+  void TellSketches(Timestamp now_ns);
+  void EndSketch();
   std::optional<std::string> moving_;  // id of the mark that is dragged
   std::optional<Eigen::Vector3d> dragged_to_;
 };

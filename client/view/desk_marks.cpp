@@ -5,32 +5,15 @@
 #include <utility>
 
 #include "client/tools/words.hpp"
+#include "client/tools/written.hpp"
 #include "client/view/desk.hpp"
+#include "client/view/patch.hpp"
 
 namespace saccade::view {
 namespace {
 
 constexpr double kBoxM = 0.1;
 constexpr Timestamp kPointNs = 25'000'000;  // between two words of a laser pointer
-
-const char* NameOf(Pane pane) { return pane == Pane::kMap ? "map" : "video"; }
-
-template <typename T, typename Value>
-AnnotationPatch PatchOf(const std::string& id, T AnnotationPatch::*field, Value&& value) {
-  AnnotationPatch patch;
-  patch.id = id;
-  patch.*field = std::forward<Value>(value);
-  return patch;
-}
-
-/// One line without control characters, as the server takes it.
-std::string CleanText(const std::string& text) {
-  std::string clean;
-  for (const char c : text) clean += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
-  const auto first = clean.find_first_not_of(' ');
-  if (first == std::string::npos) return "";
-  return clean.substr(first, clean.find_last_not_of(' ') - first + 1);
-}
 
 }  // namespace
 
@@ -47,8 +30,10 @@ std::optional<tools::Landing> Desk::LandingAt(Pane pane, const Eigen::Vector2d& 
   const decode::Picture* picture = shown();
   if (picture == nullptr || !view->camera->InImage(pixel, -0.5)) return std::nullopt;
   auto landing = tools::LandingInVideo(*view, picture->facts->frame_id, pixel, session().features);
-  // A frozen picture is clicked late, a note is placed when its text is done.
-  const bool late = state_.still || state_.tool == tools::Action::kNote;
+  // A frozen picture is clicked late, a note when its text is done.
+  const std::optional<AnnotationShape> shape = tools::ShapeOf(state_.tool);
+  const bool late = state_.still || shape == AnnotationShape::kNote ||
+                    shape == AnnotationShape::kCheckList || shape == AnnotationShape::kPicture;
   if (landing && late && same_map()) {
     if (const auto ray = tools::RayThrough(*view, pixel)) landing->later = *ray;
   }
@@ -57,6 +42,7 @@ std::optional<tools::Landing> Desk::LandingAt(Pane pane, const Eigen::Vector2d& 
 
 std::string Desk::WhyNoLanding(Pane pane) const {
   if (pane == Pane::kMap) return "nothing is mapped there.";
+  if (picture_paused()) return absl::StrCat(tools::PauseWords(*session().pause), ".");
   if (shown() == nullptr) return "there is no picture yet.";
   return video_view() ? "that is outside the picture." : "where the camera is is not known now.";
 }
@@ -92,17 +78,25 @@ void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* vie
     // One stroke is of one picture: it stands still until the stroke is done.
     if (!state_.still) Freeze(MonotonicNow());
     state_.ink.Begin(picture->facts->frame_id, pixel);
+    BeginSketch();
   }
   if (state_.tool == tools::Action::kLaser && pressed_->landing && session().link.live()) {
     laser_id_ = net::RandomUuid();
     PointAt(pressed_->landing->target, false);
   }
-  const bool selected = !pressed_->picked_id.empty() && pressed_->picked_id == state_.selected_id;
+  const bool selected = state_.selection.Has(pressed_->picked_id);
   if (state_.tool == tools::Action::kSelect && selected) moving_ = pressed_->picked_id;
 }
 
 void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view) {
-  if (state_.ink.drawing() && pane == Pane::kVideo) state_.ink.Add(pixel);
+  if (state_.ink.drawing() && pane == Pane::kVideo) {
+    const std::size_t before = state_.ink.points().size();
+    state_.ink.Add(pixel);
+    if (sketch_ && state_.ink.points().size() > before) {
+      sketch_->Add(PixelTarget{state_.ink.frame_id(), pixel});
+    }
+    TellSketches(MonotonicNow());
+  }
   if (laser_id_.empty() || MonotonicNow() - pointed_ns_ < kPointNs) return;
   if (const auto landing = LandingAt(pane, pixel, view)) PointAt(landing->target, false);
 }
@@ -111,12 +105,16 @@ void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view
 void Desk::PointAt(const AnnotationTarget& target, bool released) {
   pointed_ns_ = MonotonicNow();
   pointed_at_ = target;
-  edits_.Point({laser_id_, target, released, state_.color_rgba}, Tell("Laser pointer"));
+  edits_.Point({.stroke_id = laser_id_,
+                .targets = {target},
+                .released = released,
+                .color_rgba = state_.color_rgba},
+               Tell("Laser pointer"));
   if (released) laser_id_.clear();
 }
 
-void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, bool moved,
-                   float x, float y, Timestamp now_ns) {
+void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view,
+                   const Lift& lift, Timestamp now_ns) {
   if (!pressed_) return;
   const Pressed pressed = *std::exchange(pressed_, std::nullopt);
   const Where where = NameOf(pane);
@@ -127,22 +125,24 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
   if (state_.tool == tools::Action::kLaser) return;
   if (state_.ink.drawing()) {
     std::vector<Eigen::Vector2d> ink = state_.ink.Finish();
-    if (ink.empty()) return state_.Refuse(where, "Not placed: press and draw a stroke.", now_ns);
+    if (ink.empty()) {
+      EndSketch();
+      return state_.Refuse(where, "Nothing drawn: press, and move while you hold.", now_ns);
+    }
     Place(AnnotationShape::kInk, *pressed.landing, "", std::move(ink), where);
     state_.still.reset();
     return;
   }
-  if (moving_ && moved) {
+  if (moving_ && lift.moved) {
     const std::string id = *std::exchange(moving_, std::nullopt);
     const std::optional<tools::Landing> landing = LandingAt(pane, pixel, view);
     if (!landing) {
       return state_.Refuse(where, absl::StrCat("Not moved: ", WhyNoLanding(pane)), now_ns);
     }
-    return edits_.Update(PatchOf(id, &AnnotationPatch::target, landing->target),
-                         Tell(where, "Not moved: "));
+    return MoveSelected(id, *landing, where);
   }
   moving_.reset();
-  if (moved) return;
+  if (lift.moved) return;
   const auto refuse = [&](const char* what) {
     state_.Refuse(where, absl::StrCat(what, WhyNoLanding(pane)), now_ns);
   };
@@ -153,7 +153,8 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
   }
   const std::optional<AnnotationShape> shape = tools::ShapeOf(state_.tool);
   if (!shape) {
-    state_.selected_id = pressed.picked_id;
+    if (!lift.adds) state_.selection.Clear();
+    if (!pressed.picked_id.empty()) state_.selection.Toggle(pressed.picked_id);
     return;
   }
   if (!session().link.live()) {
@@ -164,7 +165,14 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
     return state_.Refuse(where, "Not placed: ink is drawn in the video.", now_ns);
   }
   if (*shape == AnnotationShape::kNote) {
-    state_.editor = TextEditor{pressed.landing, "", pane, x, y, "", false};
+    state_.editor = TextEditor{pressed.landing, "", pane, lift.x, lift.y, "", false};
+    return;
+  }
+  if (*shape == AnnotationShape::kCheckList || *shape == AnnotationShape::kPicture) {
+    state_.dialog.emplace();
+    state_.dialog->shape = *shape;
+    state_.dialog->landing = *pressed.landing;
+    state_.dialog->pane = pane;
     return;
   }
   if (*shape == AnnotationShape::kMeasure && !state_.measure_from) {
@@ -172,13 +180,6 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
     return;
   }
   Place(*shape, *pressed.landing, "", {}, where);
-}
-
-void Desk::Lock(Timestamp now_ns) {
-  const Annotation* mark = session().annotations.Find(state_.selected_id);
-  if (mark == nullptr) return state_.Refuse("Lock", "Select a mark first.", now_ns);
-  edits_.Update(PatchOf(mark->id, &AnnotationPatch::locked, !mark->locked),
-                Tell(absl::StrCat("annotation ", mark->id)));
 }
 
 void Desk::Place(AnnotationShape shape, const tools::Landing& landing, const std::string& text,
@@ -202,27 +203,12 @@ void Desk::Place(AnnotationShape shape, const tools::Landing& landing, const std
     placement.guess_in_world = landing.point_in_world;
   }
   const session::Edits::Done tell = Tell(where, "Not placed: ");
-  edits_.Place(std::move(placement), [this, tell](const absl::StatusOr<std::string>& id) {
-    if (id.ok()) state_.selected_id = *id;
+  const auto sketch = shape == AnnotationShape::kInk ? std::exchange(sketch_, nullptr) : nullptr;
+  edits_.Place(std::move(placement), [this, tell, sketch](const absl::StatusOr<std::string>& id) {
+    if (id.ok()) state_.selection.Only(*id);
+    if (sketch) sketch->End();  // not before: nobody sees it go and come back
     tell(id);
   });
-}
-
-void Desk::Select(const std::string& id) {
-  state_.selected_id = state_.selected_id == id ? "" : id;
-}
-
-void Desk::Remove(const std::string& id, Timestamp /*now_ns*/) {
-  if (state_.selected_id == id) state_.selected_id.clear();
-  edits_.Remove(id, Tell(absl::StrCat("annotation ", id)));
-}
-
-void Desk::Paint(std::uint32_t color_rgba, Timestamp /*now_ns*/) {
-  state_.color_rgba = color_rgba;
-  const std::string& id = state_.selected_id;
-  if (id.empty()) return;
-  edits_.Update(PatchOf(id, &AnnotationPatch::color_rgba, color_rgba),
-                Tell(absl::StrCat("annotation ", id)));
 }
 
 void Desk::EditText(const std::string& id, float x, float y) {
@@ -234,7 +220,7 @@ void Desk::EditText(const std::string& id, float x, float y) {
 void Desk::FinishEditor(bool keep, Timestamp now_ns) {
   if (!state_.editor) return;
   const TextEditor editor = *std::exchange(state_.editor, std::nullopt);
-  const std::string text = CleanText(editor.text);
+  const std::string text = tools::CleanText(editor.text);
   if (!keep) return;
   if (!editor.id.empty()) {
     return edits_.Update(PatchOf(editor.id, &AnnotationPatch::text, text),

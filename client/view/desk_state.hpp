@@ -9,6 +9,7 @@
 #include "client/tools/controls.hpp"
 #include "client/tools/landing.hpp"
 #include "client/tools/marks.hpp"
+#include "client/tools/selection.hpp"
 #include "client/view/layout.hpp"
 
 namespace saccade::view {
@@ -45,11 +46,43 @@ struct TextEditor {
   bool finish = false;  // Enter was pressed; what was typed before it may still be on its way
 };
 
+/// A check list or a picture that is to be placed.
+struct PlacingDialog {
+  AnnotationShape shape = AnnotationShape::kCheckList;
+  tools::Landing landing;
+  Pane pane = Pane::kMap;
+  std::string title;
+  std::string lines;    // of a check list
+  std::string file;     // of a picture
+  std::string problem;  // what of it cannot be kept
+  bool opened = false;  // has had the keyboard
+  bool finish = false;  // it was asked to be placed; what was typed before it may be on its way
+};
+
+/// Marks to be put somewhere else, as they were when they were copied.
+struct CopiedMark {
+  Annotation mark;
+  Eigen::Vector3d offset_in_world = Eigen::Vector3d::Zero();  // from the first one [m]
+};
+
+/// What is written to the others.
+struct TalkField {
+  bool open = false;
+  bool wanted = false;   // the field wants the keyboard
+  bool carries = false;  // the selected mark goes with the message
+  bool writing = false;  // has the keyboard
+  int field = 0;         // rises with each change from outside: ImGui keeps a copy of its own
+  bool finish = false;   // Enter was pressed; what was typed before it may still be on its way
+  std::string text;
+  std::string problem;
+};
+
 /// What this person is doing with one wearer. The thread that draws.
 class DeskState {
  public:
   tools::Action tool = tools::Action::kSelect;
-  std::string selected_id, pointed_id;
+  tools::Selection selection;
+  std::string pointed_id;
   std::optional<Hover> hover;
   Pane main = Pane::kMap;
   bool confirming_reset = false;
@@ -62,6 +95,9 @@ class DeskState {
   bool find = false;  // the field wants the keyboard
   std::optional<Still> still;
   std::optional<TextEditor> editor;
+  std::optional<PlacingDialog> dialog;
+  TalkField talk;
+  std::vector<CopiedMark> copied;
   std::vector<Rect> above;  // what lies over the panes, of the picture on the screen
   tools::InkLine ink;
   std::optional<tools::Landing> measure_from;  // one end of a distance, until the other is clicked
@@ -70,7 +106,7 @@ class DeskState {
 
   /// True if it is drawn: a selected one always is.
   bool Draws(const Annotation& annotation) const {
-    if (annotation.id == selected_id) return true;
+    if (selection.Has(annotation.id)) return true;
     return !hide_marks && tools::Passes(annotation, filter, my_name);
   }
 

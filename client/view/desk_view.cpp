@@ -32,7 +32,7 @@ absl::StatusOr<std::unique_ptr<DeskView>> DeskView::Create(const GlFunctions& gl
 void DeskView::Update() {
   const decode::Picture* picture = desk_.shown();
   scene_->Update(desk_.session());
-  if (picture == nullptr) return scene_->Show(nullptr, nullptr);
+  if (picture == nullptr || desk_.picture_paused()) return scene_->Show(nullptr, nullptr);
   const cv::Mat& rgba = picture->rgba;
   if (rgba.data != on_card_) {
     const std::span<const std::uint8_t> pixels(rgba.data, rgba.total() * rgba.elemSize());
@@ -97,6 +97,7 @@ std::string DeskView::Note(Pane pane, Timestamp now_ns) const {
                                          : ". The map has changed since: marks are not where they "
                                            "were");
   }
+  if (told.pause) return tools::PauseWords(*told.pause);
   if (!desk_.live())
     return told.link.live() ? "waiting for the first picture" : "no picture: not connected";
   const Timestamp age = now_ns - desk_.live()->decoded_ns;
@@ -107,7 +108,9 @@ std::string DeskView::Note(Pane pane, Timestamp now_ns) const {
 }
 
 std::vector<std::string> DeskView::Accented() const {
-  return {desk_.state().selected_id, desk_.state().pointed_id};
+  std::vector<std::string> ids = desk_.state().selection.ids();
+  ids.push_back(desk_.state().pointed_id);
+  return ids;
 }
 
 Marks DeskView::MarksIn(const tools::View& view) const {
@@ -173,7 +176,7 @@ void DeskView::DrawMap(const Rect& rect, const Canvas& canvas, ImDrawList* list)
 void DeskView::DrawVideo(const Rect& rect, const Canvas& canvas, ImDrawList* list) {
   list->AddRectFilled({rect.x, rect.y}, {rect.right(), rect.bottom()}, IM_COL32(12, 13, 14, 255));
   const decode::Picture* picture = desk_.shown();
-  if (picture == nullptr || texture_ == nullptr) return;
+  if (picture == nullptr || texture_ == nullptr || desk_.picture_paused()) return;
   const Placement at = VideoIn(rect);
   const Rect inside{at.left, at.top, static_cast<float>(texture_width_) * at.scale,
                     static_cast<float>(texture_height_) * at.scale};
@@ -213,9 +216,20 @@ void DeskView::DrawFeatures(const net::FrameFacts& facts, const tools::View& vie
 }
 
 void DeskView::DrawLanding(Pane pane, const tools::View& view, Painter& painter) const {
-  for (const auto& [id, laser] : desk_.session().lasers) {
-    if (const auto at = view.Project(laser.point_in_world)) {
-      painter.Laser(*at, ColorOf(laser.color_rgba), laser.display_name);
+  for (const session::OthersPointer& pointer : desk_.session().pointers.List()) {
+    const ImU32 color = ColorOf(pointer.color_rgba);
+    if (pointer.sketch) {
+      for (const Polyline2& piece :
+           ProjectPolyline(*view.camera, view.camera_from_world, pointer.points_in_world)) {
+        painter.Line(piece, color);
+      }
+    }
+    const auto at = view.Project(pointer.points_in_world.back());
+    if (at && pointer.sketch) {
+      const ImVec2 end = painter.At(*at);
+      painter.Words({end.x + 0.8f * ImGui::GetFontSize(), end.y}, pointer.name, color);
+    } else if (at) {
+      painter.Laser(*at, color, pointer.name);
     }
   }
   const auto& from = desk_.state().measure_from;

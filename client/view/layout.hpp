@@ -18,6 +18,7 @@ struct Rect {
 struct LayoutSettings {
   float panel_width = 300;    // right column
   float inset_share = 0.34f;  // of the main pane's width
+  bool talk_open = false;
   static constexpr float kLeastPanel = 220, kMostPanel = 560;
   static constexpr float kLeastInset = 0.18f, kMostInset = 0.6f;
 };
@@ -27,7 +28,7 @@ enum class Corner { kSouthEast, kSouthWest, kNorthEast, kNorthWest };
 
 /// Where everything stands in the window.
 struct Layout {
-  Rect header, tabs, tools, main, inset, panel, gaze, strip;
+  Rect header, tabs, tools, main, inset, panel, talk, gaze, strip;
   Rect panel_edge, inset_edge;  // what is dragged
   Corner corner = Corner::kSouthEast;
   float scale = 1;

@@ -49,6 +49,15 @@ void EndPanel() {
   ImGui::PopStyleColor();
 }
 
+void Wrapped(ImU32 color, const std::string& text) {
+  if (text.empty()) return;
+  ImGui::PushStyleColor(ImGuiCol_Text, color);
+  ImGui::PushTextWrapPos();
+  ImGui::TextUnformatted(text.c_str());
+  ImGui::PopTextWrapPos();
+  ImGui::PopStyleColor();
+}
+
 void NoteAbove(Desk& desk) {
   const ImVec2 at = ImGui::GetWindowPos(), size = ImGui::GetWindowSize();
   desk.state().above.push_back({at.x, at.y, size.x, size.y});
@@ -57,7 +66,7 @@ void NoteAbove(Desk& desk) {
 bool DrawHeader(const PanelContext& context, const Rect& rect) {
   const session::State& state = context.desk.session();
   const tools::StatusWords words = tools::StatusOf(state, context.now_ns);
-  BeginPanel("header", rect, kBar);
+  BeginPanel("header", rect, Colours().bar);
   const float line = 0.5f * (rect.height - ImGui::GetFontSize());
   ImGui::SetCursorPosY(line);
   ImGui::PushFont(context.fonts.bold);
@@ -76,26 +85,28 @@ bool DrawHeader(const PanelContext& context, const Rect& rect) {
   const float right = rect.width - button - 10 * context.scale;
   const float rest = right - rate_width - late_width - width(here) - 3 * gap;
   ImGui::SameLine(0, gap);
-  Fitted(kDim, context.desk.title(), std::min(width(context.desk.title()) + 1, 0.22f * rect.width));
+  Fitted(Colours().dim, context.desk.title(),
+         std::min(width(context.desk.title()) + 1, 0.22f * rect.width));
   ImGui::SameLine(0, gap);
-  Colored(words.warn ? kWarn : kText, words.mark);
+  Colored(words.warn ? Colours().warn : Colours().text, words.mark);
   ImGui::SameLine(0, 6 * context.scale);
   ImGui::PushFont(context.fonts.bold);
-  Colored(words.warn ? kWarn : kText, words.text);
+  Colored(words.warn ? Colours().warn : Colours().text, words.text);
   ImGui::PopFont();
   ImGui::SameLine(0, gap);
-  Fitted(words.warn ? kWarn : kDim, words.advice, rest - ImGui::GetCursorPosX() - gap);
+  Fitted(words.warn ? Colours().warn : Colours().dim, words.advice,
+         rest - ImGui::GetCursorPosX() - gap);
   ImGui::SetCursorPos({rest + gap, line});
-  Colored(kText, rate);
+  Colored(Colours().text, rate);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("pictures shown a second");
   ImGui::SetCursorPos({rest + gap + rate_width + gap, line});
-  Colored(kText, late);
+  Colored(Colours().text, late);
   if (ImGui::IsItemHovered()) {
     ImGui::SetTooltip(
         "from the middle of the exposure to this screen, median of the last 90 pictures");
   }
   ImGui::SetCursorPos({right - width(here) - 0.5f * gap, line});
-  Colored(kDim, here);
+  Colored(Colours().dim, here);
   if (ImGui::IsItemHovered() && !state.participants.empty()) {
     std::string names;
     for (const net::Participant& one : state.participants) {
@@ -111,16 +122,18 @@ bool DrawHeader(const PanelContext& context, const Rect& rect) {
 
 std::size_t DrawTabs(const std::vector<Desk*>& desks, std::size_t shown, const Rect& rect,
                      Timestamp now_ns) {
-  BeginPanel("tabs", rect, kBar);
+  BeginPanel("tabs", rect, Colours().bar);
   ImGui::SetCursorPosY(0.5f * (rect.height - ImGui::GetFrameHeight()));
   for (std::size_t i = 0; i < desks.size(); ++i) {
     const tools::StatusWords words = tools::StatusOf(desks[i]->session(), now_ns);
     const std::string text =
         absl::StrCat(words.mark, " ", desks[i]->title(), ": ", words.text, "###tab", i);
     const bool on = i == shown;
-    ImGui::PushStyleColor(ImGuiCol_Button, on ? kAccent : kRaised);
-    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, on ? kAccent : kLine);
-    ImGui::PushStyleColor(ImGuiCol_Text, on ? kOnAccent : words.warn ? kWarn : kText);
+    ImGui::PushStyleColor(ImGuiCol_Button, on ? Colours().accent : Colours().raised);
+    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, on ? Colours().accent : Colours().line);
+    ImGui::PushStyleColor(ImGuiCol_Text, on           ? Colours().on_accent
+                                         : words.warn ? Colours().warn
+                                                      : Colours().text);
     if (ImGui::Button(text.c_str())) shown = i;
     ImGui::PopStyleColor(3);
     ImGui::SameLine();
@@ -132,9 +145,9 @@ std::size_t DrawTabs(const std::vector<Desk*>& desks, std::size_t shown, const R
 bool ControlButton(const tools::Control& control, bool on, float width, const Fonts& fonts) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const float height = ImGui::GetFrameHeight();
-  ImGui::PushStyleColor(ImGuiCol_Button, on ? kAccent : kRaised);
-  ImGui::PushStyleColor(ImGuiCol_ButtonHovered, on ? kAccent : kLine);
-  ImGui::PushStyleColor(ImGuiCol_ButtonActive, on ? kAccent : kLine);
+  ImGui::PushStyleColor(ImGuiCol_Button, on ? Colours().accent : Colours().raised);
+  ImGui::PushStyleColor(ImGuiCol_ButtonHovered, on ? Colours().accent : Colours().line);
+  ImGui::PushStyleColor(ImGuiCol_ButtonActive, on ? Colours().accent : Colours().line);
   const bool pressed = ImGui::Button(absl::StrCat("##", control.label).c_str(), {width, height});
   ImGui::PopStyleColor(3);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s (%s)", control.hint, control.shown);
@@ -142,16 +155,16 @@ bool ControlButton(const tools::Control& control, bool on, float width, const Fo
   const float size = ImGui::GetFontSize(), y = at.y + 0.5f * (height - size);
   const float pad = 0.5f * size;
   const float key_width = fonts.text->CalcTextSizeA(0.8f * size, 1e6f, 0, control.shown).x;
-  const ImU32 text = on ? kOnAccent : kText;
+  const ImU32 text = on ? Colours().on_accent : Colours().text;
   list->AddText(fonts.text, size, {at.x + pad, y}, text, control.label);
   list->AddText(fonts.text, 0.8f * size, {at.x + width - pad - key_width, y + 0.1f * size},
-                on ? kOnAccent : kDim, control.shown);
+                on ? Colours().on_accent : Colours().dim, control.shown);
   return pressed;
 }
 
 void DrawTools(const PanelContext& context, const Rect& rect) {
   Desk& desk = context.desk;
-  BeginPanel("tools", rect, kPanel, true);
+  BeginPanel("tools", rect, Colours().panel, true);
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, ImVec2(0, 3 * context.scale));
   const float width = ImGui::GetContentRegionAvail().x;
   bool commands = false;
@@ -172,20 +185,20 @@ void DrawTools(const PanelContext& context, const Rect& rect) {
     const bool asks = control.action == kReset && desk.state().confirming_reset;
     if (refusal.empty() && !asks) continue;
     ImGui::SetNextWindowPos(beside);
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, kRaised);
+    ImGui::PushStyleColor(ImGuiCol_WindowBg, Colours().raised);
     ImGui::Begin(absl::StrCat("beside ", control.label).c_str(), nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
                      ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoMove |
                      ImGuiWindowFlags_NoFocusOnAppearing);
     if (asks) {
-      Colored(kWarn, "Forget the map? Marks pause until their place is known again.");
-      ImGui::PushStyleColor(ImGuiCol_Button, kLine);
+      Colored(Colours().warn, "Forget the map? Marks pause until their place is known again.");
+      ImGui::PushStyleColor(ImGuiCol_Button, Colours().line);
       if (ImGui::Button("Forget it")) desk.ConfirmReset(true, context.now_ns);
       ImGui::SameLine(0, 8 * context.scale);
       if (ImGui::Button("Keep it")) desk.ConfirmReset(false, context.now_ns);
       ImGui::PopStyleColor();
     } else {
-      Colored(kWarn, refusal);
+      Colored(Colours().warn, refusal);
     }
     NoteAbove(desk);
     ImGui::End();
@@ -197,21 +210,21 @@ void DrawTools(const PanelContext& context, const Rect& rect) {
 
 void DrawStrip(const PanelContext& context, const Rect& rect) {
   const session::State& state = context.desk.session();
-  BeginPanel("strip", rect, kBar);
+  BeginPanel("strip", rect, Colours().bar);
   ImGui::SetCursorPosY(0.5f * (rect.height - ImGui::GetFontSize()));
   for (std::size_t i = 0; i + 1 < session::kStages; ++i) {
     const auto times = context.desk.latency().Get(static_cast<session::Stage>(i));
     const bool known = times && state.link.live();
-    Colored(kDim, session::kStageNames[i]);
+    Colored(Colours().dim, session::kStageNames[i]);
     ImGui::SameLine(0, 5 * context.scale);
-    Colored(kText, known ? absl::StrFormat("%3.0f", times->p50) : "  –");
+    Colored(Colours().text, known ? absl::StrFormat("%3.0f", times->p50) : "  –");
     if (known && ImGui::IsItemHovered()) {
       ImGui::SetTooltip("%s: median %.1f ms, 95 %% below %.1f ms", session::kStageNames[i],
                         times->p50, times->p95);
     }
     ImGui::SameLine(0, 14 * context.scale);
   }
-  Colored(kDim, "ms");
+  Colored(Colours().dim, "ms");
   if (state.statistics && state.link.live()) {
     const net::Statistics& told = *state.statistics;
     std::string words;
@@ -228,7 +241,7 @@ void DrawStrip(const PanelContext& context, const Rect& rect) {
     const float at = rect.width - width - 12 * context.scale;
     if (at > ImGui::GetCursorPosX()) {
       ImGui::SetCursorPosX(at);
-      Colored(kDim, words);
+      Colored(Colours().dim, words);
     }
   }
   EndPanel();

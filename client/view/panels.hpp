@@ -34,9 +34,15 @@ void DrawGaze(const PanelContext& context, const Rect& rect);
 void DrawStrip(const PanelContext& context, const Rect& rect);
 /// The field in which a note or a mark's text is written; nothing while none is.
 void DrawEditor(const PanelContext& context, const Rect& within);
+/// The fields for a check list or a picture that is to be placed; nothing while there is none.
+void DrawDialog(const PanelContext& context, const Rect& within);
+/// What people say, and a field to say something; folded to its head where `rect` is that low.
+void DrawTalk(const PanelContext& context, const Rect& rect);
 /// What the keys do and what the colours mean, over everything. `open` false: does nothing.
 void DrawHelp(const PanelContext& context, bool& open);
 
+/// Wrapped at the panel's edge; nothing of empty words.
+void Wrapped(ImU32 color, const std::string& text);
 /// A button with its key; true when pressed. `on`: it is the current one.
 bool ControlButton(const tools::Control& control, bool on, float width, const Fonts& fonts);
 /// A fixed, borderless window that fills `rect`.

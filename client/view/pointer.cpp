@@ -74,6 +74,14 @@ void Pointer::Handle(const InputEvent& event, const Layout& layout, Desk& desk,
       desk.Hold();
       break;
     }
+    case Kind::kDrop: {
+      const std::optional<Target> target = PaneAt(event.x, event.y, layout, desk);
+      if (!over_panes || !target) break;
+      const Place place = PlaceAt(event.x, event.y, *target, desk, view, layout.scale);
+      desk.DropFile(event.file, target->pane, place.pixel, place.view ? &*place.view : nullptr,
+                    now_ns);
+      break;
+    }
     case Kind::kKey:
       break;
   }
@@ -119,6 +127,7 @@ void Pointer::Move(const InputEvent& event, const Layout& layout, Desk& desk, co
     case What::kInsetEdge:
       return DragInsetEdge(layout, event.x, settings);
     case What::kPan:
+      if (!moved_) return;
       desk.orbit().Pan(-dx / target_.rect.height, -dy / target_.rect.height);
       return desk.Hold();
     case What::kOrbit:
@@ -157,10 +166,29 @@ void Pointer::Move(const InputEvent& event, const Layout& layout, Desk& desk, co
 void Pointer::Release(const InputEvent& event, const Layout& layout, Desk& desk,
                       const DeskView& view, Timestamp now_ns) {
   const What what = std::exchange(what_, What::kNothing);
-  if (what != What::kPane) return;
+  // With Shift and without moving it is a click.
+  const bool adds = what == What::kPan && !moved_ && event.button == 0;
+  if (what != What::kPane && !adds) return;
   const Place place = PlaceAt(event.x, event.y, target_, desk, view, layout.scale);
-  desk.Release(target_.pane, place.pixel, place.view ? &*place.view : nullptr, moved_, event.x,
-               event.y, now_ns);
+  if (adds) {
+    desk.Press(target_.pane, place.pixel, place.view ? &*place.view : nullptr, place.pick_px);
+  }
+  desk.Release(target_.pane, place.pixel, place.view ? &*place.view : nullptr,
+               {moved_, event.x, event.y, event.shift || adds}, now_ns);
+}
+
+void Pointer::Paste(const Layout& layout, Desk& desk, const DeskView& view, Timestamp now_ns) {
+  std::optional<Target> target = PaneAt(last_x_, last_y_, layout, desk);
+  float x = last_x_, y = last_y_;
+  if (!target) {
+    target = Target{desk.state().main, layout.main};
+    x = layout.main.x + 0.5f * layout.main.width;
+    y = layout.main.y + 0.5f * layout.main.height;
+  }
+  const Place place = PlaceAt(x, y, *target, desk, view, layout.scale);
+  std::optional<Eigen::Vector2d> pixel;
+  if (place.inside) pixel = place.pixel;
+  desk.Paste(target->pane, pixel, place.view ? &*place.view : nullptr, now_ns);
 }
 
 bool Pointer::HandleKey(const InputEvent& event, const Layout& layout, Desk& desk,
@@ -176,7 +204,7 @@ bool Pointer::HandleKey(const InputEvent& event, const Layout& layout, Desk& des
     if (!place.inside) return true;
     const tools::View* eye = place.view ? &*place.view : nullptr;
     desk.Press(target.pane, place.pixel, eye, place.pick_px);
-    desk.Release(target.pane, place.pixel, eye, false, x, y, now_ns);
+    desk.Release(target.pane, place.pixel, eye, {false, x, y, event.shift}, now_ns);
     return true;
   }
   const auto arrow = [&](double right, double down) {

@@ -19,6 +19,8 @@ class Pointer {
   /// Arrow keys, plus and minus in the map, Enter in the main pane. True if it was one of them.
   bool HandleKey(const InputEvent& event, const Layout& layout, Desk& desk, const DeskView& view,
                  Timestamp now_ns);
+  /// Where the pointer is, else in the middle of the large pane.
+  void Paste(const Layout& layout, Desk& desk, const DeskView& view, Timestamp now_ns);
   /// Over an edge that can be dragged, or dragging it.
   bool over_edge() const { return over_edge_; }
 

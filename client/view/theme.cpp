@@ -21,11 +21,15 @@ ImFont* Load(const char* name, float size_px) {
   return ImGui::GetIO().Fonts->AddFontFromFileTTF(file.c_str(), size_px, &config, kRanges);
 }
 
+const Palette* current = &kDark;  // main thread
+
 void Colour(ImGuiCol which, ImU32 color) {
   ImGui::GetStyle().Colors[which] = ImGui::ColorConvertU32ToFloat4(color);
 }
 
 }  // namespace
+
+const Palette& Colours() { return *current; }
 
 ImU32 ColorOf(FeatureState state) {
   switch (state) {
@@ -39,7 +43,8 @@ ImU32 ColorOf(FeatureState state) {
   return IM_COL32(0xff, 0xd8, 0x4d, 255);
 }
 
-absl::Status ApplyTheme(float scale, Fonts& fonts) {
+absl::Status ApplyTheme(float scale, bool light, Fonts& fonts) {
+  current = light ? &kLight : &kDark;
   ImGuiStyle style;
   style.WindowRounding = style.ChildRounding = 0;
   style.FrameRounding = style.PopupRounding = style.GrabRounding = 4;
@@ -50,26 +55,27 @@ absl::Status ApplyTheme(float scale, Fonts& fonts) {
   style.ScrollbarSize = 10;
   style.ScaleAllSizes(scale);
   ImGui::GetStyle() = style;
-  ImGui::StyleColorsDark();
-  Colour(ImGuiCol_WindowBg, kPanel);
-  Colour(ImGuiCol_PopupBg, kRaised);
-  Colour(ImGuiCol_Text, kText);
-  Colour(ImGuiCol_TextDisabled, kDim);
-  Colour(ImGuiCol_Border, kLine);
-  Colour(ImGuiCol_FrameBg, kBar);
-  Colour(ImGuiCol_FrameBgHovered, kRaised);
-  Colour(ImGuiCol_FrameBgActive, kRaised);
-  Colour(ImGuiCol_Button, kRaised);
-  Colour(ImGuiCol_ButtonHovered, kLine);
-  Colour(ImGuiCol_ButtonActive, kLine);
-  Colour(ImGuiCol_Header, kRaised);
-  Colour(ImGuiCol_HeaderHovered, kRaised);
-  Colour(ImGuiCol_HeaderActive, kLine);
-  Colour(ImGuiCol_ScrollbarBg, kPanel);
-  Colour(ImGuiCol_ScrollbarGrab, kLine);
-  Colour(ImGuiCol_CheckMark, kAccent);
-  Colour(ImGuiCol_NavHighlight, kAccent);
-  Colour(ImGuiCol_TextSelectedBg, IM_COL32(0xc4, 0xb0, 0xff, 90));
+  light ? ImGui::StyleColorsLight() : ImGui::StyleColorsDark();
+  Colour(ImGuiCol_WindowBg, Colours().panel);
+  Colour(ImGuiCol_PopupBg, Colours().raised);
+  Colour(ImGuiCol_Text, Colours().text);
+  Colour(ImGuiCol_TextDisabled, Colours().dim);
+  Colour(ImGuiCol_Border, Colours().line);
+  Colour(ImGuiCol_FrameBg, Colours().bar);
+  Colour(ImGuiCol_FrameBgHovered, Colours().raised);
+  Colour(ImGuiCol_FrameBgActive, Colours().raised);
+  Colour(ImGuiCol_Button, Colours().raised);
+  Colour(ImGuiCol_ButtonHovered, Colours().line);
+  Colour(ImGuiCol_ButtonActive, Colours().line);
+  Colour(ImGuiCol_Header, Colours().raised);
+  Colour(ImGuiCol_HeaderHovered, Colours().raised);
+  Colour(ImGuiCol_HeaderActive, Colours().line);
+  Colour(ImGuiCol_ScrollbarBg, Colours().panel);
+  Colour(ImGuiCol_ScrollbarGrab, Colours().line);
+  Colour(ImGuiCol_CheckMark, Colours().accent);
+  Colour(ImGuiCol_NavHighlight, Colours().accent);
+  Colour(ImGuiCol_TextSelectedBg,
+         light ? IM_COL32(0x5a, 0x3f, 0xb3, 70) : IM_COL32(0xc4, 0xb0, 0xff, 90));
   ImGui::GetIO().Fonts->Clear();
   fonts.text = Load("DejaVuSans.ttf", kTextPx * scale);
   fonts.bold = Load("DejaVuSans-Bold.ttf", kTextPx * scale);

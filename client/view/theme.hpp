@@ -26,6 +26,20 @@ inline constexpr ImU32 kWhite = IM_COL32_WHITE;
 inline constexpr ImU32 kAxis = IM_COL32(0xc9, 0xcc, 0xd0, 255);
 inline constexpr ImU32 kTarget = IM_COL32(0x57, 0xd9, 0x77, 255);
 
+/// Of what stands round the panes; those stay dark, as a picture's own light is what counts there.
+struct Palette {
+  ImU32 bar, panel, raised, line, text, dim, accent, on_accent, warn;
+};
+inline constexpr Palette kDark = {kBar, kPanel,  kRaised,   kLine, kText,
+                                  kDim, kAccent, kOnAccent, kWarn};
+inline constexpr Palette kLight = {IM_COL32(0xe4, 0xe6, 0xe8, 255), IM_COL32(0xf4, 0xf5, 0xf6, 255),
+                                   IM_COL32(0xff, 0xff, 0xff, 255), IM_COL32(0xc6, 0xca, 0xce, 255),
+                                   IM_COL32(0x17, 0x18, 0x1a, 255), IM_COL32(0x4c, 0x52, 0x58, 255),
+                                   IM_COL32(0x5a, 0x3f, 0xb3, 255), IM_COL32(0xff, 0xff, 0xff, 255),
+                                   IM_COL32(0x8f, 0x40, 0x00, 255)};
+/// As ApplyTheme was told last. The main thread, as ImGui's own style.
+const Palette& Colours();
+
 ImU32 ColorOf(FeatureState state);
 /// 0xRRGGBBAA, drawn opaque.
 inline ImU32 ColorOf(std::uint32_t rgba) {
@@ -40,6 +54,6 @@ struct Fonts {
 /// Sets ImGui's style and makes its fonts at this scale; may be called again when it changes. The
 /// font texture has to be made anew then.
 ///   NotFound  no font of DejaVu is installed, with the package's name
-absl::Status ApplyTheme(float scale, Fonts& fonts);
+absl::Status ApplyTheme(float scale, bool light, Fonts& fonts);
 
 }  // namespace saccade::view

@@ -101,6 +101,9 @@ void Window::Listen() {
   });
   glfwSetCharCallback(window_,
                       [](GLFWwindow* w, unsigned codepoint) { Self(w)->OnCharacter(codepoint); });
+  glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** files) {
+    if (count > 0) Self(w)->Add({.kind = InputEvent::Kind::kDrop, .file = files[0]});
+  });
   glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { Self(w)->refresh_ = true; });
   glfwSetFramebufferSizeCallback(window_,
                                  [](GLFWwindow* w, int, int) { Self(w)->refresh_ = true; });
@@ -170,11 +173,12 @@ void Window::Close() { glfwSetWindowShouldClose(window_, GLFW_TRUE); }
 
 absl::Status Window::Begin() {
   const float now = scale();
-  if (std::abs(now - fonts_scale_) > 0.01f) {
+  if (std::abs(now - fonts_scale_) > 0.01f || light_ != light_shown_) {
     if (fonts_scale_ > 0) ImGui_ImplOpenGL3_DestroyFontsTexture();
-    if (absl::Status themed = ApplyTheme(now, fonts_); !themed.ok()) return themed;
+    if (absl::Status themed = ApplyTheme(now, light_, fonts_); !themed.ok()) return themed;
     if (fonts_scale_ > 0) ImGui_ImplOpenGL3_CreateFontsTexture();
     fonts_scale_ = now;
+    light_shown_ = light_;
   }
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();

@@ -16,12 +16,13 @@ namespace saccade::view {
 
 /// Something a person did, in the order in which it happened, with the pointer where it was then.
 struct InputEvent {
-  enum class Kind { kPress, kRelease, kMove, kScroll, kKey, kLeave };
+  enum class Kind { kPress, kRelease, kMove, kScroll, kKey, kLeave, kDrop };
   Kind kind = Kind::kMove;
   float x = 0, y = 0;  // in the window
   int button = 0;      // 0 left, 1 right, 2 middle
   float scroll = 0;    // notches; up is above 0
   bool shift = false;
+  std::string file{};     // kDrop
   bool repeat = false;    // kKey
   tools::KeyPress key{};  // kKey; besides the controls' keys "left" ... "down", "+", "-", "enter"
 };
@@ -47,6 +48,8 @@ class Window {
   void Wait(double timeout_s);
   /// Ends a Wait(), from any thread.
   static void Wake();
+  void SetLight(bool light) { light_ = light; }
+  bool light() const { return light_; }
   /// What happened since the last call.
   std::vector<InputEvent> TakeInput();
   /// True once after the system wants it drawn anew (resized, uncovered).
@@ -79,6 +82,7 @@ class Window {
   GlFunctions gl_;
   Fonts fonts_;
   float fonts_scale_ = 0;
+  bool light_ = false, light_shown_ = false;
   bool imgui_ = false, refresh_ = true, repeating_ = false;
   std::vector<InputEvent> input_;
 };

@@ -8,6 +8,7 @@
 #include "client/decode/player.hpp"
 #include "client/session/edits.hpp"
 #include "client/session/gaze_pilot.hpp"
+#include "client/session/pointing.hpp"
 #include "client/session/session.hpp"
 #include "tests/integration/stream/in_process_server.hpp"
 
@@ -96,6 +97,79 @@ TEST(ClientSession, AMarkIsShownAtOnceAnsweredUndoneAndMadeAgain) {
   bool redone = false;
   expert.edits().Redo([&redone](const auto& done) { redone = done.ok(); });
   ASSERT_TRUE(expert.Until([&] { return redone && expert.state().annotations.size() == 1; }));
+}
+
+TEST(ClientSession, WhatIsSaidIsHeardAndWhatWasSaidBeforeIsKnown) {
+  InProcessServer server;
+  Expert first(server.address());
+  ASSERT_TRUE(first.Until([&] { return first.state().link.live(); }));
+  first.edits().Say("the left screw", "", [](const auto& said) { ASSERT_TRUE(said.ok()); });
+  ASSERT_TRUE(first.Until([&] { return first.state().chat.messages().size() == 1; }));
+  Expert second(server.address());
+  ASSERT_TRUE(second.Until([&] { return second.state().chat.messages().size() == 1; }));
+  EXPECT_EQ(second.state().chat.messages()[0].text, "the left screw");
+  EXPECT_EQ(second.state().chat.messages()[0].display_name, "Tess");
+  EXPECT_EQ(second.state().chat.Unread(second.state().joined.participant_id), 0u);
+  second.edits().Say("here?", "", [](const auto& said) { ASSERT_TRUE(said.ok()); });
+  ASSERT_TRUE(first.Until([&] { return first.state().chat.messages().size() == 2; }));
+  EXPECT_EQ(first.state().chat.Unread(first.state().joined.participant_id), 1u);
+}
+
+TEST(ClientSession, ThePauseOfThePictureIsToldWithWhoDidIt) {
+  InProcessServer server;
+  Expert expert(server.address());
+  ASSERT_TRUE(expert.Until([&] { return expert.picture().has_value(); }));
+  EXPECT_FALSE(expert.state().pause);
+  net::ConnectionOptions options;
+  options.server = server.address();
+  options.display_name = "Ann";
+  options.role = net::Role::kWearer;
+  const auto wearer = net::Connection::Create(options);
+  ASSERT_TRUE(wearer.ok());
+  ASSERT_TRUE((*wearer)->PausePicture(true).ok());
+  ASSERT_TRUE(expert.Until([&] { return expert.state().pause.has_value(); }));
+  EXPECT_EQ(expert.state().pause->by, "Ann");
+  ASSERT_TRUE((*wearer)->PausePicture(false).ok());
+  ASSERT_TRUE(expert.Until([&] { return !expert.state().pause; }));
+}
+
+TEST(ClientSession, AListIsTickedMarksOfOneGroupGoTogetherAndAStrokeIsSeenToGrow) {
+  InProcessServer server;
+  Expert expert(server.address()), other(server.address());
+  ASSERT_TRUE(expert.Until([&] { return expert.picture().has_value(); }));
+  ASSERT_TRUE(other.Until([&] { return other.state().link.live(); }));
+  const FrameId frame = expert.picture()->facts->frame_id;
+  std::vector<std::string> ids;
+  for (const double u : {60.0, 100.0, 200.0}) {
+    session::Edits::Placement placement;
+    placement.draft.shape = AnnotationShape::kCheckList;
+    placement.draft.check_items = {"drain", "fill"};
+    placement.draft.target = PixelTarget{frame, {u, 120}};
+    if (!ids.empty()) placement.edit_group = "both";
+    expert.edits().Place(placement, [&ids](const absl::StatusOr<std::string>& placed) {
+      ASSERT_TRUE(placed.ok()) << placed.status();
+      ids.push_back(*placed);
+    });
+    if (u < 100) ASSERT_TRUE(expert.Until([&] { return ids.size() == 1; }));
+  }
+  ASSERT_TRUE(expert.Until([&] { return ids.size() == 3; }));
+  other.edits().Tick(ids[0], 1, true, [](const auto& done) { ASSERT_TRUE(done.ok()); });
+  ASSERT_TRUE(expert.Until([&] {
+    const Annotation* mark = expert.state().annotations.Find(ids[0]);
+    return mark != nullptr && mark->check_items && (*mark->check_items)[1].done;
+  }));
+  session::Pointing stroke(net::RandomUuid(), 0xff9a3dff);
+  for (int i = 0; i < 20; ++i) stroke.Add(PixelTarget{frame, {100.0 + 4 * i, 120}});
+  expert.edits().Point(*stroke.Due(MonotonicNow()), [&stroke](const auto& told) {
+    ASSERT_TRUE(told.ok()) << told.status();
+    stroke.Answered();
+  });
+  ASSERT_TRUE(other.Until([&] { return !other.state().pointers.List().empty(); }));
+  EXPECT_TRUE(other.state().pointers.List()[0].sketch);
+  EXPECT_GE(other.state().pointers.List()[0].points_in_world.size(), 2u);
+  expert.edits().Undo([](const auto& done) { ASSERT_TRUE(done.ok()) << done.status(); });
+  ASSERT_TRUE(expert.Until([&] { return expert.state().annotations.size() == 1; }))
+      << "one step took both back";
 }
 
 TEST(ClientSession, WhatIsRefusedIsSaidAndTakenBack) {

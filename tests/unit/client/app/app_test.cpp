@@ -72,6 +72,7 @@ TEST_F(SettingsFiles, ComeBackAsTheyWereAndAreTheirOwnersAlone) {
   settings.window = {1600, 900, true};
   settings.layout.panel_width = 333;
   settings.main = view::Pane::kVideo;
+  settings.light = settings.layout.talk_open = true;
   ASSERT_TRUE(SaveSettings(file, settings).ok());
   struct stat facts {};
   ASSERT_EQ(::stat(file.c_str(), &facts), 0);
@@ -84,6 +85,8 @@ TEST_F(SettingsFiles, ComeBackAsTheyWereAndAreTheirOwnersAlone) {
   EXPECT_TRUE(read.window.maximised);
   EXPECT_FLOAT_EQ(read.layout.panel_width, 333);
   EXPECT_EQ(read.main, view::Pane::kVideo);
+  EXPECT_TRUE(read.light);
+  EXPECT_TRUE(read.layout.talk_open);
 }
 
 TEST_F(SettingsFiles, OnesThatMakeNoSenseAreNamedAndChangeNothing) {
@@ -93,6 +96,8 @@ TEST_F(SettingsFiles, OnesThatMakeNoSenseAreNamedAndChangeNothing) {
   const absl::Status loaded = LoadSettings(file, settings);
   EXPECT_THAT(std::string(loaded.message()), HasSubstr("panel_width"));
   EXPECT_EQ(settings.name, "");
+  std::ofstream(file) << "[client]\ntheme = \"pink\"\n";
+  EXPECT_THAT(std::string(LoadSettings(file, settings).message()), HasSubstr("theme"));
   EXPECT_TRUE(LoadSettings(folder_ / "none.toml", settings).ok());
 }
 

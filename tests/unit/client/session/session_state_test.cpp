@@ -3,6 +3,7 @@
 
 #include "client/session/acknowledger.hpp"
 #include "client/session/latency.hpp"
+#include "client/session/pointing.hpp"
 #include "client/session/state.hpp"
 
 namespace saccade::session {
@@ -91,6 +92,114 @@ TEST(State, ThePathEndsWhereTheMapJumpsAndHasNoLostPoses) {
   pose.map_revision = 1;
   state.Apply(pose, 0);
   EXPECT_THAT(state.path, SizeIs(1));
+}
+
+TEST(State, ThePictureIsPausedUntilItIsSaidThatItIsNot) {
+  State state;
+  state.Apply(net::PicturePause{false, "", 0}, 0);
+  EXPECT_FALSE(state.pause);
+  state.Apply(net::PicturePause{true, "Ann", 7}, 0);
+  ASSERT_TRUE(state.pause);
+  state.Begin("again", {});
+  EXPECT_EQ(state.pause->by, "Ann") << "over a lost connection as it was last told";
+  state.Apply(net::PicturePause{false, "Ann", 9}, 0);
+  EXPECT_FALSE(state.pause);
+}
+
+net::ChatMessage Said(std::uint64_t number, const std::string& by = "ann") {
+  return {number, by, by, "text", "", 0};
+}
+
+TEST(ChatBook, KeepsTheLast500InTheirOrderEachOnce) {
+  ChatBook book;
+  book.Add({Said(2)});
+  book.History({Said(1), Said(2)});
+  ASSERT_THAT(book.messages(), SizeIs(2));
+  EXPECT_EQ(book.messages()[0].number, 1u);
+  for (std::uint64_t i = 3; i <= 600; ++i) book.Add({Said(i)});
+  ASSERT_THAT(book.messages(), SizeIs(ChatBook::kKept));
+  EXPECT_EQ(book.messages().front().number, 101u);
+  EXPECT_EQ(book.messages().back().number, 600u);
+}
+
+TEST(ChatBook, WhatWasSaidBeforeIsNoNewsNorIsWhatOneSaysOneself) {
+  ChatBook book;
+  book.History({Said(1), Said(2)});
+  EXPECT_EQ(book.Unread("me"), 0u);
+  book.Add({Said(3), Said(4, "me")});
+  EXPECT_EQ(book.Unread("me"), 1u);
+  book.MarkRead();
+  EXPECT_EQ(book.Unread("me"), 0u);
+}
+
+TEST(ChatBook, AfterTheServerStartedAnewItsConversationIsAnotherOne) {
+  ChatBook book;
+  book.History({Said(1), Said(2), Said(3)});
+  book.History({Said(1, "bob")});
+  ASSERT_THAT(book.messages(), SizeIs(1));
+  EXPECT_EQ(book.messages()[0].display_name, "bob");
+  EXPECT_EQ(book.Unread("me"), 1u);
+}
+
+net::PointerNews Stroke(std::size_t first, std::vector<Eigen::Vector3d> points) {
+  return {.participant_id = "ann",
+          .display_name = "Ann",
+          .stroke_id = "s",
+          .sketch = true,
+          .first = first,
+          .points_in_world = std::move(points)};
+}
+
+TEST(PointerBook, AStrokeGrowsWhatIsToldAgainCountsOnceAndItsEndEndsIt) {
+  PointerBook book;
+  book.Apply({Stroke(0, {{0, 0, 1}, {1, 0, 1}})}, "me", 0);
+  book.Apply({Stroke(1, {{1, 0, 1}, {2, 0, 1}})}, "me", 0);
+  ASSERT_THAT(book.List(), SizeIs(1));
+  EXPECT_THAT(book.List()[0].points_in_world, SizeIs(3));
+  book.Apply({Stroke(0, {{5, 0, 1}})}, "ann", 0);
+  EXPECT_THAT(book.List()[0].points_in_world, SizeIs(3)) << "one's own";
+  net::PointerNews laser = Stroke(0, {{0, 0, 1}, {0, 0, 2}});
+  laser.sketch = false;
+  book.Apply({laser}, "me", 0);
+  EXPECT_EQ(book.lasers(), 1u);
+  EXPECT_THAT(book.List()[0].points_in_world, ElementsAre(Eigen::Vector3d(0, 0, 2)));
+  net::PointerNews end = Stroke(3, {});
+  end.released = true;
+  book.Apply({end}, "me", 0);
+  EXPECT_THAT(book.List(), SizeIs(1));
+  EXPECT_FALSE(book.Expire(1000 * kMs));
+  EXPECT_TRUE(book.Expire(1600 * kMs));
+}
+
+TEST(Pointing, SendsWhatIsNewInOrderOneCallAtATimeAndItsEndLast) {
+  Pointing stroke("s", 0xff0000ff);
+  EXPECT_FALSE(stroke.Due(1000 * kMs));
+  for (int i = 0; i < 70; ++i) stroke.Add(PixelTarget{7, {1.0 * i, 0}});
+  const auto first = stroke.Due(1000 * kMs);
+  ASSERT_TRUE(first);
+  EXPECT_THAT(first->targets, SizeIs(64));
+  EXPECT_TRUE(first->sketch);
+  stroke.End();
+  EXPECT_FALSE(stroke.Due(1100 * kMs)) << "one call at a time";
+  stroke.Answered();
+  EXPECT_FALSE(stroke.Due(1010 * kMs)) << "60 a second";
+  const auto second = stroke.Due(1100 * kMs);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(std::get<PixelTarget>(second->targets.front()).pixel.x(), 64);
+  EXPECT_TRUE(second->released);
+  EXPECT_TRUE(stroke.over());
+}
+
+TEST(Pointing, AHandThatHoldsStillIsHeardOfAgain) {
+  Pointing stroke("s", 0);
+  stroke.Add(PixelTarget{7, {3, 4}});
+  ASSERT_TRUE(stroke.Due(1000 * kMs));
+  stroke.Answered();
+  EXPECT_FALSE(stroke.Due(1300 * kMs));
+  const auto again = stroke.Due(1401 * kMs);
+  ASSERT_TRUE(again);
+  EXPECT_THAT(again->targets, SizeIs(1));
+  EXPECT_FALSE(again->released);
 }
 
 TEST(Acknowledger, SpeaksEveryEighthEventAndHoldsBackWhileTheDecoderIsBehind) {

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/tools/selection.hpp"
 #include "client/tools/words.hpp"
+#include "client/tools/written.hpp"
 
 namespace saccade::tools {
 namespace {
@@ -68,6 +70,43 @@ TEST(InkLine, LeavesOutWhatIsNearAndSmoothsWhatIsLeft) {
   EXPECT_THAT(ink.Finish(), IsEmpty()) << "a point is no stroke";
 }
 
+TEST(Selection, GrowsAndShrinksByToggling) {
+  Selection selection;
+  selection.Only("a");
+  selection.Toggle("b");
+  EXPECT_EQ(selection.last(), "b");
+  selection.Toggle("a");
+  EXPECT_FALSE(selection.Has("a"));
+  EXPECT_THAT(selection.ids(), SizeIs(1));
+  selection.Only("c");
+  EXPECT_THAT(selection.ids(), SizeIs(1));
+  selection.Clear();
+  EXPECT_EQ(selection.last(), "");
+}
+
+TEST(ReadList, TakesALineForEachThingAndSaysWhatCannotBeKept) {
+  const auto list = ReadList(" Oil\tchange ", "drain\n\n  fill \r\n");
+  ASSERT_TRUE(list.ok()) << list.status();
+  EXPECT_EQ(list->title, "Oil change");
+  EXPECT_THAT(list->items, ::testing::ElementsAre("drain", "fill"));
+  EXPECT_EQ(ReadList("x", " \n").status().message(), "Write at least one line.");
+  EXPECT_EQ(ReadList("", "a\n" + std::string(101, 'b')).status().message(),
+            "Line 2 has 101 bytes, and at most 100 are kept: shorten it.");
+  std::string many;
+  for (int i = 0; i < 31; ++i) many += "a\n";
+  EXPECT_EQ(ReadList("", many).status().message(), "31 lines, and at most 30 are kept.");
+  EXPECT_EQ(ReadList(std::string(502, 't'), "a").status().message(),
+            "The title is 2 bytes too long: shorten it.");
+}
+
+TEST(TitleOf, IsItsTextElseItsShape) {
+  Annotation mark;
+  EXPECT_EQ(TitleOf(mark), "the cube");
+  mark.shape = AnnotationShape::kCheckList;
+  mark.text = "Oil\nsecond";
+  EXPECT_EQ(TitleOf(mark), "check list “Oil”");
+}
+
 TEST(StatusWords, SayWhatIsWrongAndWhatToDo) {
   session::State state;
   constexpr Timestamp kSecond = 1'000'000'000;
@@ -80,6 +119,12 @@ TEST(StatusWords, SayWhatIsWrongAndWhatToDo) {
   EXPECT_EQ(StatusOf(state, 20 * kSecond).text, "lost");
   EXPECT_EQ(StatusOf(state, 20 * kSecond).advice, "show a place seen before");
   EXPECT_EQ(StatusOf(state, 25 * kSecond).text, "no picture for 5 s");
+  state.pause = net::PicturePause{true, "Ann", 0};
+  EXPECT_EQ(StatusOf(state, 25 * kSecond).text, "picture paused") << "and it is not missed";
+  EXPECT_EQ(PauseWords(*state.pause).substr(0, 24), "Ann paused the picture a");
+  state.pause->by.clear();
+  EXPECT_EQ(PauseWords(*state.pause).substr(0, 10), "The wearer");
+  state.pause.reset();
   pose.status = TrackingStatus::kTracking;
   pose.quality = TrackingQuality::kGood;
   state.Apply(pose, 26 * kSecond);
