@@ -150,7 +150,9 @@ TEST(ClientSession, AListIsTickedMarksOfOneGroupGoTogetherAndAStrokeIsSeenToGrow
       ASSERT_TRUE(placed.ok()) << placed.status();
       ids.push_back(*placed);
     });
-    if (u < 100) ASSERT_TRUE(expert.Until([&] { return ids.size() == 1; }));
+    if (u < 100) {
+      ASSERT_TRUE(expert.Until([&] { return ids.size() == 1; }));
+    }
   }
   ASSERT_TRUE(expert.Until([&] { return ids.size() == 3; }));
   other.edits().Tick(ids[0], 1, true, [](const auto& done) { ASSERT_TRUE(done.ok()); });

@@ -52,7 +52,9 @@ TEST(Controls, NoKeyMeansOneThingHereAndAnotherOnThePage) {
   page.merge(talk);
   for (const Control& control : Controls()) {
     for (const auto& [label, key] : page) {
-      if (key == control.key) EXPECT_EQ(label, control.label) << key;
+      if (key == control.key) {
+        EXPECT_EQ(label, control.label) << key;
+      }
     }
   }
 }
