@@ -7,6 +7,7 @@ import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { Expert } from './expert.mjs';
 import { frozenPicture } from './freeze.mjs';
+import { AT_OUTLINES } from './outlines.mjs';
 import { CLEAR, displacement, REACH_PX } from './outline.mjs';
 import { cubePixels, inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
 import { decodePng, median, pixelsOf, psnr } from './pictures.mjs';
@@ -203,7 +204,7 @@ async function placeMany(context, pane, aim) {
 /** Objects with their truth in a frame, least used first. */
 export const candidates = (frame, used) =>
   frame.objects
-    .filter(({ visible, pixel }) => visible && pixel)
+    .filter(({ name, visible, pixel }) => visible && pixel && !AT_OUTLINES.includes(name))
     .sort((a, b) => (used.get(a.name) ?? 0) - (used.get(b.name) ?? 0));
 
 export async function aimInVideo({ expert, truth, camera }, used) {

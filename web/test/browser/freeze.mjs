@@ -2,6 +2,7 @@
 // also when it is older than the ring and the server holds it as a fetched still?
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { inCamera, length, minus } from './optics.mjs';
+import { AT_OUTLINES } from './outlines.mjs';
 import { decodePng, greyOf, median, psnr } from './pictures.mjs';
 
 const OBJECTS = 5; // clicked at once, and again when the frame is gone; of three, two may lie on outlines
@@ -97,7 +98,7 @@ async function placeOn(expert, frame, count = OBJECTS) {
   const placed = [];
   for (const object of frame.objects) {
     if (placed.length === count) break;
-    if (!object.visible || !object.pixel) continue;
+    if (!object.visible || !object.pixel || AT_OUTLINES.includes(object.name)) continue;
     const [u, v] = object.pixel;
     if (u < 30 || v < 30 || u > width - 30 || v > height - 30) continue;
     const at = [left + (u + 0.5) * scale, top + (v + 0.5) * scale];

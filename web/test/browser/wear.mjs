@@ -162,11 +162,9 @@ export async function runWear({ server: binary, chromium, seed, shots, folder })
 
 async function checkAll(context) {
   const { check, server, saccade, folder } = context;
-  check(
-    'the server starts without a phone, and says so',
-    /waiting for the phone/.test(server.errors()),
-    'yes',
-  );
+  const said = () => /waiting for the phone/.test(server.errors());
+  for (const end = Date.now() + 5000; !said() && Date.now() < end; ) await sleep(50);
+  check('the server starts without a phone, and says so', said(), 'within 5 s');
   const home = join(folder, 'home');
   trust(context, home);
   const wearer = JSON.parse(saccade('invite', '--role', 'wearer', '--json'));
