@@ -8,7 +8,7 @@ import { median } from './pictures.mjs';
 export const BITS = 9; // of a picture's number
 export const BLOCK = { width: 16, height: 8 }; // of a bit, in the uppermost rows: no feature is looked for there
 export const MARKS = Number(process.env['SACCADE_MARKS'] ?? 3);
-const IN_MAP = Math.floor(MARKS / 3);
+const IN_MAP = MARKS < 10 ? 0 : Math.floor(MARKS / 3); // the few of every run are placed in the video
 const MARK_MS = 30_000; // for one, with misses
 const AIM_PX = 15; // a click farther than this from its object missed it: taken back, tried again
 const VIDEO_PX = 8;
