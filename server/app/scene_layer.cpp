@@ -13,6 +13,11 @@ namespace {
 // The edges of what hides: finer than the picture's own pixels, which the lens cuts anew.
 constexpr double kDrawnPerPixel = 2.0;
 
+bool SameLens(const CameraIntrinsics& a, const CameraIntrinsics& b) {
+  return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
+         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion;
+}
+
 }  // namespace
 
 cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
@@ -28,11 +33,14 @@ cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
     Log(absl::StrCat("the scene is not drawn: ", why.message()));
     return cv::Mat();
   };
-  if (view_ == nullptr) {
+  // A lens that is learnt changes while the server runs.
+  if (view_ == nullptr || !SameLens(intrinsics_, camera.intrinsics())) {
+    revision_ = 0;
     absl::StatusOr<std::unique_ptr<SceneView>> made =
         SceneView::Create(camera, backend_, kDrawnPerPixel);
     if (!made.ok()) return give_up(made.status());
     view_ = *std::move(made);
+    intrinsics_ = camera.intrinsics();
   }
   if (revision_ != scene.revision || moves_) {
     absl::Status set = view_->SetMeshes(PlacedMeshes(scene, annotations));

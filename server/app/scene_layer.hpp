@@ -27,6 +27,7 @@ class SceneLayer {
   const GlBackend backend_;
   std::mutex mutex_;
   std::unique_ptr<SceneView> view_;
+  CameraIntrinsics intrinsics_;  // of the view
   bool failed_ = false;
   std::uint64_t revision_ = 0;
   bool moves_ = false;  // something is fixed to an annotation: uploaded each time
