@@ -59,12 +59,13 @@ TEST_F(Installed, HoldsNothingElseBesides) {
     if (!entry.is_regular_file()) continue;
     const std::string path = entry.path().string().substr(folder_->path().size());
     EXPECT_TRUE(std::regex_search(
-        path, std::regex("^(/usr/bin/saccade(-server|-eval|-decode|-client)?|/usr/lib/systemd/"
-                         "system/saccade.service|"
-                         "/etc/saccade/saccade.toml|/usr/share/(saccade/web|doc/saccade)/.*|"
-                         "/usr/share/applications/saccade-client.desktop|"
-                         "/usr/share/icons/hicolor/scalable/apps/saccade.svg|"
-                         "/usr/share/man/man[18]/saccade.*)$")))
+        path,
+        std::regex("^(/usr/bin/saccade(-server|-eval|-decode|-client)?|/usr/lib/systemd/"
+                   "system/saccade.service|"
+                   "/etc/saccade/saccade.toml|/usr/share/(saccade/(web|models)|doc/saccade)/.*|"
+                   "/usr/share/applications/saccade-client.desktop|"
+                   "/usr/share/icons/hicolor/scalable/apps/saccade.svg|"
+                   "/usr/share/man/man[18]/saccade.*)$")))
         << path;
   }
 }

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -57,7 +58,9 @@ TEST(Options, SeveralServersAreTabsAndOneServerWithOneLinkIsOne) {
 
 class SettingsFiles : public ::testing::Test {
  protected:
-  SettingsFiles() : folder_(fs::path(::testing::TempDir()) / "client-settings") {
+  SettingsFiles()
+      : folder_(fs::path(::testing::TempDir()) /
+                ("client-settings-" + std::to_string(::getpid()))) {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }

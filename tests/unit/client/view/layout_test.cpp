@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -109,7 +110,8 @@ class PictureFile : public ::testing::Test {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return (folder_ / name).string();
   }
-  const fs::path folder_ = fs::path(::testing::TempDir()) / "picture-files";
+  const fs::path folder_ =
+      fs::path(::testing::TempDir()) / ("picture-files-" + std::to_string(::getpid()));
 };
 
 TEST_F(PictureFile, IsFittedIntoWhatTheServerKeeps) {

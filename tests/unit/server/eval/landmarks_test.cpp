@@ -1,5 +1,6 @@
 // Trackers in a hall with squares on its walls: Koller's alone (T23), and fused.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 
@@ -23,7 +24,8 @@ class HallOfSquares : public ::testing::Test {
     auto made = SquaresSource::Create(options);
     ASSERT_TRUE(made.ok()) << made.status();
     source_ = *std::move(made);
-    file_ = std::filesystem::path(testing::TempDir()) / "landmarks_of_hall.toml";
+    file_ = std::filesystem::path(testing::TempDir()) /
+            ("landmarks_of_hall-" + std::to_string(::getpid()) + ".toml");
     std::ofstream(file_) << source_->squares().ToToml();
   }
 

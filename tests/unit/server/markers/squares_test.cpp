@@ -1,6 +1,7 @@
 // Squares that are known about: their map, and the search for their sides.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <opencv2/imgproc.hpp>
@@ -126,7 +127,8 @@ TEST(SquareWatch, SeesOnItsOwnThreadWhatTheDetectorSees) {
 class SquareMapFile : public ::testing::Test {
  protected:
   std::filesystem::path Write(const std::string& text) {
-    const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "squares.toml";
+    const std::filesystem::path file = std::filesystem::path(testing::TempDir()) /
+                                       ("squares-" + std::to_string(::getpid()) + ".toml");
     std::ofstream(file) << text;
     return file;
   }

@@ -1,5 +1,6 @@
 // The models that ship (deploy/models).
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -70,7 +71,8 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedModel,
                                          "divider", "person"));
 
 TEST(ShippedModels, AreWhatTheScriptWrites) {
-  const std::filesystem::path out = std::filesystem::path(testing::TempDir()) / "shipped_models";
+  const std::filesystem::path out =
+      std::filesystem::path(testing::TempDir()) / ("shipped_models-" + std::to_string(::getpid()));
   const std::string command = (kFolder / "generate").string() + " " + out.string();
   ASSERT_EQ(std::system(command.c_str()), 0) << "python3 is missing? deploy/install brings it";
   int files = 0;

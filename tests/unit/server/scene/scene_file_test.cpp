@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -45,7 +46,8 @@ TEST(Shapes, APlaneShowsItsUpperSide) {
 class SceneFile : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "scene_file_test";
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              ("scene_file_test-" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
     std::ofstream(folder_ / "part.glb", std::ios::binary) << GlbBuilder::Triangle().Bytes();
   }

@@ -1,6 +1,7 @@
 #include "server/store/scene_store.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -10,7 +11,8 @@ namespace {
 class SceneStoreTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "scene_store_test";
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              ("scene_store_test-" + std::to_string(::getpid()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }

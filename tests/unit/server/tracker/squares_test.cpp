@@ -1,6 +1,7 @@
 // Where a square is, by one picture and by many.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <random>
@@ -136,7 +137,8 @@ TEST(LandmarkOptions, AreReadAndRefused) {
   EXPECT_TRUE(options.Set("mode", "koller").ok());
   EXPECT_THAT(std::string(options.Validate().message()), HasSubstr("landmarks.file"));
 
-  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "config.toml";
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) /
+                                     ("squares-config-" + std::to_string(::getpid()) + ".toml");
   std::ofstream(file) << "[landmarks]\nmode = \"koller\"\nfile = \"squares.toml\"\n";
   LandmarkOptions read;
   ASSERT_TRUE(read.LoadToml(file).ok());
