@@ -48,8 +48,11 @@ export async function runChecks({
     ]);
   const context = { failures: 0, shots, server: await start() };
   context.render = (id) => renderTruth(evaluator, source, id, join(folder, 'truth'));
+  let since = Date.now();
   context.check = (name, ok, figures) => {
-    console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
+    const seconds = ((Date.now() - since) / 1000).toFixed(0);
+    since = Date.now();
+    console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures} [${seconds} s]`);
     if (!ok) ++context.failures;
   };
   try {
@@ -207,24 +210,37 @@ export const candidates = (frame, used) =>
     .filter(({ name, visible, pixel }) => visible && pixel && !AT_OUTLINES.includes(name))
     .sort((a, b) => (used.get(a.name) ?? 0) - (used.get(b.name) ?? 0));
 
-export async function aimInVideo({ expert, truth, camera }, used) {
+/**
+ * A hand leads what moves: from how the object went these frames, where it will be when the press arrives. How
+ * long that takes is learnt from press to press.
+ */
+const LEARNT_FRAMES = 6;
+const leading = ({ truth, lag = 0 }, frame, { name, pixel }) => {
+  const before = truth.frame(frame.frame - LEARNT_FRAMES)?.objects.find((o) => o.name === name);
+  if (!before?.pixel) return pixel;
+  return pixel.map((value, i) => value + ((value - before.pixel[i]) * lag) / LEARNT_FRAMES);
+};
+
+export async function aimInVideo(context, used) {
+  const { expert, truth, camera } = context;
   const { id, left, top, scale, width, height } = await expert.look();
   const frame = truth.frame(id);
   if (!frame) return undefined;
-  for (const { name, pixel } of candidates(frame, used)) {
-    const [u, v] = pixel;
+  for (const object of candidates(frame, used)) {
+    const [u, v] = leading(context, frame, object);
     if (u < 30 || v < 30 || u > width - 30 || v > height - 30) continue;
     const at = [left + (u + 0.5) * scale, top + (v + 0.5) * scale];
     if (!(await expert.isOver('.video', at))) continue;
     await expert.click(at);
-    return { name, where: () => clickedPoint(expert, truth, camera, name) };
+    const pressed = await expert.pressed();
+    context.lag = ((context.lag ?? 0) + Math.min(30, pressed.id - id)) / 2;
+    return { name: object.name, where: () => clickedPoint(pressed, truth, camera, object.name) };
   }
   return undefined;
 }
 
 /** What lay under the click in the frame that was clicked, at its object's depth. */
-async function clickedPoint(expert, truth, camera, name) {
-  const { id, pixel } = await expert.pressed();
+function clickedPoint({ id, pixel }, truth, camera, name) {
   const frame = truth.frame(id);
   const object = frame?.objects.find((entry) => entry.name === name);
   if (!object?.pixel || !object.visible || length(minus(object.pixel, pixel)) > AIM_PX)
