@@ -1,3 +1,5 @@
+import { determinant, Matrix, SVD } from 'ml-matrix';
+
 // Projection through the camera's lens, written anew: the test does not trust the page's own.
 
 /** Rotates v by a unit quaternion [x, y, z, w]. */
@@ -70,4 +72,18 @@ export function cubePixels(camera, pose, centre, size, border) {
     }
   }
   return out;
+}
+
+/** The similarity that takes points `from` nearest to points `to` (least squares; Umeyama 1991, eq. 40 to 42). */
+export function similarity(from, to) {
+  const centreOf = (points) => times(points.reduce(plus), 1 / points.length);
+  const [a, b] = [centreOf(from), centreOf(to)];
+  const away = (points, centre) => new Matrix(points.map((point) => minus(point, centre)));
+  const [A, B] = [away(from, a), away(to, b)];
+  const svd = new SVD(B.transpose().mmul(A));
+  const [U, V] = [svd.leftSingularVectors, svd.rightSingularVectors];
+  const S = Matrix.diag([1, 1, Math.sign(determinant(U) * determinant(V))]);
+  const R = U.mmul(S).mmul(V.transpose());
+  const scale = S.mmul(Matrix.diag(svd.diagonal)).trace() / A.norm() ** 2;
+  return (point) => plus(times(R.mmul(Matrix.columnVector(minus(point, a))).to1DArray(), scale), b);
 }

@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { aimInMap } from './checks.mjs';
-import { inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
+import { inCamera, inWorld, length, minus, project, similarity, unproject } from './optics.mjs';
 import { median } from './pictures.mjs';
 
 export const BITS = 9; // of a picture's number
@@ -123,25 +123,46 @@ async function placeMark({ expert, truth, camera }, placed) {
   return undefined;
 }
 
-/** One cube by the map, on an object of which the map has something. */
+/**
+ * One cube by the map, on an object of which the map has something. A phone's map has a frame and a scale of its
+ * own: the marks that stand already say which.
+ */
 async function placeInMap(context, placed) {
   const { expert, truth, saccade, whom, folder } = context;
   const file = join(folder, 'map.ply');
   saccade(...whom, 'map', '--out', file);
   const upserted = pointsOf(readFileSync(file, 'latin1'));
+  const standing = new Map(
+    JSON.parse(saccade(...whom, '--json', 'annotations', 'list')).map(({ id, anchor }) => [
+      id,
+      anchor.point_in_world_m,
+    ]),
+  );
+  const inVideo = placed.filter(({ byMap }) => !byMap);
+  const inMap = similarity(
+    inVideo.map(({ point }) => point),
+    inVideo.map(({ id }) => standing.get(id)),
+  );
   const { number } = await shownBy(expert.page);
+  const frame = truth.frame(number);
+  if (!frame) return undefined;
+  const objects = frame.objects.map((object) => ({
+    ...object,
+    point_in_world_m: inMap(object.point_in_world_m),
+  }));
   const before = await expert.annotationIds();
   const click = await aimInMap(
     {
       expert,
-      truth: { frame: () => truth.frame(number) },
+      truth: { frame: () => ({ ...frame, objects }) },
       map: { get: () => Promise.resolve({ map: { upserted } }) },
     },
     new Map(placed.map(({ name }) => [name, placed.filter((mark) => mark.name === name).length])),
   );
   if (!click) return undefined;
   const { id } = await expert.newAnnotation(before);
-  return id && { id, name: click.name, point: (await click.where()).point };
+  const point = frame.objects.find(({ name }) => name === click.name).point_in_world_m;
+  return id && { id, name: click.name, point, byMap: true };
 }
 
 /** Of a PLY file in words. */
