@@ -12,7 +12,7 @@ const IN_MAP = MARKS < 10 ? 0 : Math.floor(MARKS / 3); // the few of every run a
 const MARK_MS = 30_000; // for one, with misses
 const AIM_PX = 15; // a click farther than this from its object missed it: taken back, tried again
 const VIDEO_PX = 8;
-const MAP_PX = 16; // two per cent of depth, seen from elsewhere
+const MAP_PX = 21; // four per cent of depth: a click in the map takes what the map has near it
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
