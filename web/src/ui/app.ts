@@ -5,6 +5,7 @@ import { LatencyMeter, RateMeter, stageTimes } from '../session/latency';
 import { personIdOf } from '../session/me';
 import { isNameless, keepName } from '../session/name';
 import type { Session } from '../session/session';
+import type { Participant } from '../session/types';
 import { shapeOf, TOOLS } from '../tools/tools';
 import { WorkerKeeping } from '../transport/lease_keeper';
 import { Aim } from './aim';
@@ -76,6 +77,7 @@ export class App {
   private readonly talk: TalkPanel;
   private readonly firstTask: FirstTask;
   private readonly stage = h('main', {});
+  private nameless = isNameless(location.search, storage());
   private mapLoading = false;
   private panelsMs = 0;
   private panelsVersion = '';
@@ -157,16 +159,21 @@ export class App {
   }
 
   start(): void {
-    this.askName();
     window.addEventListener('pagehide', () => this.pilot.leave());
     // The first picture comes first; three.js, the larger part of the page, after it.
     setTimeout(() => this.loadMap(), MAP_AT_LATEST_MS);
     requestAnimationFrame((nowMs) => this.frame(nowMs));
   }
 
-  /** Once: whoever has said it, or came with it, is not asked again. */
-  private askName(): void {
-    if (!isNameless(location.search, storage())) return;
+  /**
+   * Once: whoever has said it, or came with it, is not asked again; nor is who signed in, for the server knows
+   * who that is. Who is refused has a way in to choose first.
+   */
+  private askName(me: Participant | undefined): void {
+    const { session } = this;
+    if (!this.nameless || (!me && session.link.kind !== 'waiting')) return;
+    this.nameless = false;
+    if (me && me.name !== session.displayName) return;
     const dialog = new NameDialog(this.session.displayName, (name) => {
       keepName(name, storage());
       this.header.setName(name);
@@ -228,6 +235,7 @@ export class App {
   private meet(): void {
     const { state, session } = this;
     const me = session.participants.find((each) => each.participantId === session.participantId);
+    this.askName(me);
     state.me = { name: me?.name ?? session.displayName, personId: personIdOf(session) };
     const colour = session.joined?.colorRgba ?? 0;
     if (state.colourChosen || colour === 0 || colour === state.colorRgba) return;

@@ -127,7 +127,7 @@ async function signIn({ server: binary, chromium, seed, shots, folder }, algorit
     const wearer = await visit('/wearer');
     const theirs = wearer.page.getByRole('button', { name: 'Sign in with Firm & Sons' });
     await logIn(wearer, theirs, 'ada', provider);
-    await wearer.page.waitForURL('**/wearer', { timeout: 60_000 });
+    await wearer.page.waitForURL(/\/wearer(\?|$)/, { timeout: 60_000 });
     check('one comes back to the page that one came from', true, wearer.page.url());
     const errors = open.flatMap((expert) => expert.errors);
     check('page errors', errors.length === 0, errors.join('; ') || 'none');
