@@ -229,7 +229,7 @@ async function several(context) {
   await sleep(300);
   await shot(context, 'area');
   await page.mouse.up();
-  await sleep(400);
+  await page.locator('aside li.selected').first().waitFor({ timeout: 10_000 });
   const chosen = await page.locator('aside li.selected').count();
   await ann.press('v');
   const before = (await listOf(context)).length;
