@@ -7,7 +7,7 @@ import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 import { delays, tapAudio, toneWav } from './audio_tap.mjs';
 import { Expert } from './expert.mjs';
-import { barriers } from './layout.mjs';
+import { barriers } from './axe.mjs';
 import { startServer } from './server.mjs';
 
 const VOICE_S = 30;
