@@ -316,7 +316,7 @@ async function pause(context) {
   const status = await ann.page.locator('header .status').innerText();
   check(
     'tracking goes on',
-    (await pose()) > before && /tracking|coasting/.test(status),
+    (await pose()) > before && /picture paused the map stays live/.test(status.replace(/\s+/g, ' ')),
     status.replace(/\s+/g, ' '),
   );
   const words = await wim.page.locator('.paused-words').innerText();
