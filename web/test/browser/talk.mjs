@@ -31,7 +31,7 @@ const microphone = (folder, name, hz) => {
 
 export async function runTalk({ server: binary, chromium, seed, shots, folder }) {
   const server = await startServer(binary, [
-    ...['--source', `sim:desk?seed=${seed}&motion=sway`, '--mount', 'sim'],
+    ...['--source', `sim:desk?seed=${seed}&motion=sway&width=320&height=240`, '--mount', 'sim'],
     ...['--data-dir', join(folder, 'talk-data')],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);
