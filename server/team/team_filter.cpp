@@ -14,11 +14,11 @@ bool IsFinite(const BlockState& state) {
          state.numbers.allFinite();
 }
 
-absl::Status NoBlock(BlockId id) {
+}  // namespace
+
+absl::Status TeamFilter::NoBlock(BlockId id) {
   return absl::InvalidArgumentError(absl::StrCat("there is no block ", id, "; it may have left"));
 }
-
-}  // namespace
 
 absl::Status TeamFilter::CheckNew(const std::string& name, const BlockState& state,
                                   const Eigen::MatrixXd& covariance) const {
@@ -113,128 +113,6 @@ absl::Status TeamFilter::Predict(BlockId id, const BlockState& state,
     if (pair.second == id) cross = (cross * transition.transpose()).eval();
   }
   return absl::OkStatus();
-}
-
-absl::StatusOr<ObservationModel> TeamFilter::Ask(std::span<const BlockId> blocks,
-                                                 const Expectation& expectation,
-                                                 const std::vector<BlockState>& at,
-                                                 const Eigen::MatrixXd& noise) const {
-  std::vector<const BlockState*> states;
-  for (const BlockState& each : at) states.push_back(&each);
-  std::optional<ObservationModel> model = expectation(states);
-  if (!model) return absl::OutOfRangeError("cannot be seen from where things are");
-  const auto rows = model->residual.size();
-  bool fits = rows > 0 && model->jacobians.size() == blocks.size() && noise.rows() == rows &&
-              noise.cols() == rows;
-  for (std::size_t k = 0; fits && k < blocks.size(); ++k) {
-    fits = model->jacobians[k].rows() == rows && model->jacobians[k].cols() == at[k].dim();
-  }
-  if (!fits) return absl::InvalidArgumentError("residual, Jacobians and noise do not fit together");
-  return *std::move(model);
-}
-
-absl::StatusOr<BlockUpdate> TeamFilter::Update(std::span<const BlockId> blocks,
-                                               const Expectation& expectation,
-                                               const Eigen::MatrixXd& noise,
-                                               const UpdateOptions& options) {
-  std::vector<BlockState> start;
-  for (const BlockId id : blocks) {
-    if (!Has(id)) return NoBlock(id);
-    if (std::count(blocks.begin(), blocks.end(), id) > 1) {
-      return absl::InvalidArgumentError(absl::StrCat(name(id), " is named twice"));
-    }
-    start.push_back(state(id));
-  }
-  const Eigen::MatrixXd prior = Among(blocks);
-  Eigen::VectorXd error = Eigen::VectorXd::Zero(prior.rows());
-  Eigen::MatrixXd jacobian;
-  Eigen::VectorXd solved;  // S^-1 innovation
-  Eigen::LLT<Eigen::MatrixXd> factor;
-  BlockUpdate update;
-  for (int k = 0; k < std::max(1, options.iterations); ++k) {
-    std::vector<BlockState> at;
-    int column = 0;
-    for (const BlockState& each : start) {
-      at.push_back(Moved(each, error.segment(column, each.dim())));
-      column += each.dim();
-    }
-    const absl::StatusOr<ObservationModel> model = Ask(blocks, expectation, at, noise);
-    if (!model.ok()) return model.status();
-    jacobian.resize(model->residual.size(), prior.rows());
-    column = 0;
-    for (const Eigen::MatrixXd& each : model->jacobians) {
-      jacobian.middleCols(column, each.cols()) = each;
-      column += static_cast<int>(each.cols());
-    }
-    const Eigen::VectorXd innovation = model->residual + jacobian * error;
-    const Eigen::MatrixXd spread = jacobian * prior * jacobian.transpose();
-    if (k == 0) {
-      factor.compute(spread + noise);
-      if (factor.info() != Eigen::Success || !innovation.allFinite()) break;
-      update.distance2 = innovation.dot(factor.solve(innovation));
-      if (options.student_dof > 0) {
-        update.weight = (options.student_dof + static_cast<double>(innovation.size())) /
-                        (options.student_dof + update.distance2);
-        update.weight = std::min(1.0, update.weight);
-      }
-    }
-    factor.compute(spread + noise / update.weight);
-    if (factor.info() != Eigen::Success || !innovation.allFinite()) break;
-    solved = factor.solve(innovation);
-    error = prior * jacobian.transpose() * solved;
-  }
-  if (factor.info() != Eigen::Success || !error.allFinite() || solved.size() == 0) {
-    return absl::FailedPreconditionError("innovation covariance is not positive definite");
-  }
-
-  // All that shares knowledge with them follows.
-  const std::vector<BlockId> connected = Connected(blocks);
-  std::vector<Eigen::MatrixXd> gains;  // P H^T L^-T of each
-  for (const BlockId id : connected) {
-    Eigen::MatrixXd with = Eigen::MatrixXd::Zero(state(id).dim(), jacobian.rows());
-    int column = 0;
-    for (const BlockId seen : blocks) {
-      const auto part = jacobian.middleCols(column, state(seen).dim());
-      if (seen == id) {
-        with += covariance(id) * part.transpose();
-      } else if (Share(id, seen)) {
-        with += Cross(id, seen) * part.transpose();
-      }
-      column += static_cast<int>(part.cols());
-    }
-    gains.push_back(factor.matrixL().solve(with.transpose()).transpose());
-  }
-  const Eigen::VectorXd white = factor.matrixL().transpose() * solved;
-  for (std::size_t a = 0; a < connected.size(); ++a) {
-    blocks_.at(connected[a]).covariance -= gains[a] * gains[a].transpose();
-    for (std::size_t b = a + 1; b < connected.size(); ++b) {
-      Eigen::MatrixXd& cross = cross_[Pair(connected[a], connected[b])];
-      if (cross.size() == 0) cross.setZero(gains[a].rows(), gains[b].rows());
-      cross -= gains[a] * gains[b].transpose();
-    }
-  }
-  for (std::size_t a = 0; a < connected.size(); ++a) Correct(connected[a], gains[a] * white);
-  return update;
-}
-
-void TeamFilter::Correct(BlockId id, const Eigen::VectorXd& error) {
-  Block& block = blocks_.at(id);
-  block.state = Moved(block.state, error);
-  // Rotation errors are counted from the new estimate (slam-spec 1: G).
-  if (block.state.pose) Turn(id, RightJacobianSo3(error.segment<3>(3)));
-}
-
-void TeamFilter::Turn(BlockId id, const Eigen::Matrix3d& turn) {
-  Eigen::MatrixXd& own = blocks_.at(id).covariance;
-  own.middleRows<3>(3) = (turn * own.middleRows<3>(3)).eval();
-  own.middleCols<3>(3) = (own.middleCols<3>(3) * turn.transpose()).eval();
-  own = (0.5 * (own + own.transpose())).eval();
-  for (auto& [pair, cross] : cross_) {
-    if (pair.first == id) cross.middleRows<3>(3) = (turn * cross.middleRows<3>(3)).eval();
-    if (pair.second == id) {
-      cross.middleCols<3>(3) = (cross.middleCols<3>(3) * turn.transpose()).eval();
-    }
-  }
 }
 
 std::optional<BlockId> TeamFilter::Find(const std::string& name) const {

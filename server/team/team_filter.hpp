@@ -96,7 +96,9 @@ class TeamFilter {
     Eigen::MatrixXd covariance;
   };
   using Pair = std::pair<BlockId, BlockId>;  // first < second
+  struct Solution;
 
+  static absl::Status NoBlock(BlockId id);
   const Eigen::MatrixXd* CrossOf(BlockId a, BlockId b) const;
   absl::Status CheckNew(const std::string& name, const BlockState& state,
                         const Eigen::MatrixXd& covariance) const;
@@ -105,6 +107,9 @@ class TeamFilter {
                                        const Expectation& expectation,
                                        const std::vector<BlockState>& at,
                                        const Eigen::MatrixXd& noise) const;
+  absl::StatusOr<Solution> Solve(std::span<const BlockId> blocks, const Expectation& expectation,
+                                 const Eigen::MatrixXd& noise, const UpdateOptions& options) const;
+  void Spread(std::span<const BlockId> blocks, const Solution& solution);
   Eigen::MatrixXd Among(std::span<const BlockId> blocks) const;
   void Correct(BlockId id, const Eigen::VectorXd& error);
   void Turn(BlockId id, const Eigen::Matrix3d& turn);

@@ -38,7 +38,7 @@ class Problem {
           !poses.world_from_wand[static_cast<std::size_t>(view.instant)]) {
         continue;
       }
-      if (view.camera != fixed && slots_[c] < 0) slots_[c] = cameras_++;
+      if (fixed != kAllCameras && view.camera != fixed && slots_[c] < 0) slots_[c] = cameras_++;
       views_.push_back(&view);
     }
   }
@@ -186,6 +186,7 @@ std::optional<WandFit> AdjustWand(const std::vector<CameraModel>& lenses,
   WandFit fit;
   fit.points = system->points;
   fit.rms_px = std::sqrt(system->sum_px2 / static_cast<double>(system->points));
+  if (fixed == kAllCameras) return fit;
   const Eigen::MatrixXd covariance = problem.CameraCovariance(*system);
   for (std::size_t c = 0; c < problem.slots().size(); ++c) {
     const int slot = problem.slots()[c];

@@ -31,6 +31,9 @@ struct WandFit {
   std::map<int, Matrix6d> camera_covariance;
 };
 
+/// All cameras stay.
+inline constexpr int kAllCameras = -1;
+
 /// Moves all placed cameras but `fixed`, and all placed bodies, to where their views fit best:
 /// Levenberg-Marquardt on reprojection errors with Student's t (4 degrees of freedom, `sigma_px`),
 /// bodies eliminated by the Schur complement. Views of what is not placed are passed over.

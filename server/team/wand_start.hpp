@@ -1,41 +1,15 @@
 #pragma once
 
-#include <absl/status/statusor.h>
-
-#include <Eigen/Dense>
-#include <array>
-#include <map>
-#include <string>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/team/wand_adjustment.hpp"
+#include "server/team/wand_views.hpp"
 #include "shared/camera/camera_model.hpp"
 #include "shared/geometry/rigid3.hpp"
 
 namespace saccade {
-
-/// A body that carries square tags, and cameras that stand still and see it.
-struct WandBody {
-  std::map<int, Rigid3> wand_from_tag;
-  double side_m = 0.0;
-};
-struct TagSight {
-  int camera = 0, instant = 0, tag = 0;
-  std::array<Eigen::Vector2d, 4> corners;  // [px], in the order of their detector
-};
-
-/// Which of a tag's corners (-,-) (+,-) (+,+) (-,+) comes at each place of a detector's list.
-using CornerOrder = std::array<int, 4>;
-
-/// The one of eight orders in which views of several tags at once fit. FailedPrecondition: no view
-/// has two tags, none fits to 3 px, or two fit alike.
-absl::StatusOr<CornerOrder> FindCornerOrder(const std::vector<CameraModel>& lenses,
-                                            const WandBody& body,
-                                            const std::vector<TagSight>& sights);
-
-/// The sights of each camera and instant together.
-std::vector<WandView> ViewsOf(const WandBody& body, const std::vector<TagSight>& sights,
-                              const CornerOrder& order);
 
 struct WandStartOptions {
   double sigma_px = 0.5;
@@ -73,13 +47,15 @@ class WandTeam {
   bool PlaceCameras();
   double Agreement(int camera, const Rigid3& world_from_camera) const;
   void Adjust(int iterations);
+  bool Reconsider();
 
   std::vector<CameraModel> lenses_;
   WandBody body_;
   WandStartOptions options_;
   std::vector<WandView> views_;
   std::vector<Candidates> candidates_;  // of each view
-  int instants_ = 0;
+  std::vector<std::size_t> begin_;      // of each instant's views
+  int instants_ = 0, adjust_at_ = 0;
   int reference_ = -1;
   WandPoses poses_;
   std::optional<WandFit> fit_;
