@@ -148,6 +148,13 @@ absl::StatusOr<Json> RunCameras(const TeamArguments& arguments, const TeamSettin
     cameras.push_back(std::move(one));
   }
   report["cameras"] = std::move(cameras);
+  Json unplaced = Json::array();
+  for (std::size_t c = 0; c < data->lenses.size(); ++c) {
+    if (!result->world_from_camera.contains(static_cast<int>(c))) {
+      unplaced.push_back(absl::StrCat("cam", c));
+    }
+  }
+  report["not_placed"] = std::move(unplaced);
   return report;
 }
 
