@@ -11,6 +11,8 @@
 
 #include "server/eval/commands.hpp"
 #include "server/eval/markers/marker_flags.hpp"
+#include "server/eval/team/team_command.hpp"
+#include "server/eval/team/team_settings.hpp"
 #include "shared/version/version.hpp"
 
 namespace saccade {
@@ -80,6 +82,21 @@ void AddRun(CLI::App& app, RunArguments& arguments) {
   run->add_option("--freeze", arguments.freeze,
                   "K:SECONDS: from frame K on its picture stands still so long");
   run->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
+}
+
+void AddTeam(CLI::App& app, TeamArguments& arguments) {
+  CLI::App* team = app.add_subcommand(
+      "team", "Many in one filter: robots that see each other, or static cameras and a wand");
+  team->add_option("--dataset", arguments.dataset,
+                   "Folder in the form of UTIAS MRCLAM, or with cameras.yaml, detections.csv and "
+                   "wand_tags.csv")
+      ->required();
+  team->add_option("--out", arguments.out, "Folder for report.json and the trajectories (TUM)")
+      ->required();
+  team->add_option("--set", arguments.set, "One option as team.key=value; may be repeated")
+      ->take_all();
+  team->add_flag("--json", arguments.json, "Print the report as JSON, not as a table");
+  team->footer(TeamSettingsHelp());
 }
 
 void AddScore(CLI::App& app, ScoreArguments& arguments) {
@@ -274,6 +291,7 @@ int Main(int argc, char** argv) {
   PrintMarkersArguments print;
   CalibrateTargetArguments target;
   PlacementsArguments placements, occlusion;
+  TeamArguments team;
   occlusion.count = 100;
   AddRun(app, run);
   AddScore(app, score);
@@ -287,6 +305,7 @@ int Main(int argc, char** argv) {
   AddCalibrateTarget(app, target);
   AddPlacements(app, placements);
   AddOcclusion(app, occlusion);
+  AddTeam(app, team);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -307,6 +326,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("calibrate")) status = CalibrateTargetCommand(target);
   if (app.got_subcommand("placements")) status = PlacementsCommand(placements);
   if (app.got_subcommand("occlusion")) status = OcclusionCommand(occlusion);
+  if (app.got_subcommand("team")) status = TeamCommand(team);
   return status.ok() ? 0 : Fail(status);
 }
 
