@@ -47,7 +47,8 @@ absl::Status App::AddTab(const Options& options, const Address& address) {
   session.connection.person_key = cli::PersonKey(address.server, settings_.name);
   session.enter = MakeEntrance(options, address);
   Tab tab;
-  tab.desk = std::make_unique<view::Desk>(std::move(session), address.server, &view::Window::Wake);
+  tab.desk = std::make_unique<view::Desk>(std::move(session), address.server, settings_.voice,
+                                          &view::Window::Wake);
   tab.desk->state().main = settings_.main;
   tab.desk->state().talk.open = settings_.layout.talk_open;
   tab.desk->state().my_name = settings_.name;
@@ -108,6 +109,10 @@ void App::HandleInput(Timestamp now_ns) {
       HandleKey(event, now_ns);
       continue;
     }
+    if (event.kind == view::InputEvent::Kind::kLet) {
+      for (const Tab& each : tabs_) each.desk->PressToTalk(false);
+      continue;
+    }
     const std::vector<view::Rect>& above = tab().desk->state().above;
     const bool covered = std::any_of(above.begin(), above.end(), [&event](const view::Rect& rect) {
       return rect.Contains(event.x, event.y);
@@ -150,6 +155,9 @@ void App::HandleKey(const view::InputEvent& event, Timestamp now_ns) {
     if (help_ && action == tools::Action::kHelp) help_ = false;
     return;
   }
+  if (event.key.key == " " && desk.voice().push_to_talk() && !io.NavVisible) {
+    return desk.PressToTalk(true);
+  }
   if (!action) {
     if (!io.NavVisible) pointer_.HandleKey(event, layout_, desk, *tab().view, now_ns);
     return;
@@ -161,14 +169,70 @@ void App::HandleKey(const view::InputEvent& event, Timestamp now_ns) {
     shown_ = (shown_ + 1) % tabs_.size();
   } else if (*action == tools::Action::kTheme) {
     window_->SetLight(!window_->light());
-  } else if (*action == tools::Action::kPaste) {
-    pointer_.Paste(layout_, desk, *tab().view, now_ns);
-  } else {
+  } else if (!RunInPane(*action, event.shift, now_ns)) {
+    if (*action == tools::Action::kEscape) pointer_.LetGo();
     desk.Run(*action, now_ns);
   }
 }
 
+bool App::RunInPane(tools::Action action, bool shift, Timestamp now_ns) {
+  view::Desk& desk = *tab().desk;
+  const view::Rect& main = layout_.main;
+  switch (action) {
+    case tools::Action::kPaste:
+      pointer_.Paste(layout_, desk, *tab().view, now_ns);
+      return true;
+    case tools::Action::kTurnLeft:
+    case tools::Action::kTurnRight: {
+      const std::optional<tools::View> view = desk.state().main == view::Pane::kMap
+                                                  ? std::optional(desk.map_view(main))
+                                                  : desk.video_view();
+      desk.Turn(action == tools::Action::kTurnLeft ? -1 : 1, shift, view ? &*view : nullptr,
+                now_ns);
+      return true;
+    }
+    case tools::Action::kEditText:
+      if (!desk.state().selection.empty()) {
+        desk.EditText(desk.state().selection.last(), main.x + 0.4f * main.width,
+                      main.y + 0.4f * main.height);
+      }
+      return true;
+    default:
+      return false;
+  }
+}
+
+void App::NeedFonts() {
+  for (const Tab& each : tabs_) {
+    const session::State& told = each.desk->session();
+    for (const Annotation& mark : told.annotations.List()) {
+      window_->Need(mark.text);
+      window_->Need(mark.author);
+      if (!mark.check_items) continue;
+      for (const CheckItem& item : *mark.check_items) {
+        window_->Need(item.text);
+        window_->Need(item.done_by);
+      }
+    }
+    for (const net::ChatMessage& message : told.chat.messages()) {
+      window_->Need(message.display_name);
+      window_->Need(message.text);
+    }
+    for (const net::Participant& person : told.participants) window_->Need(person.display_name);
+    const view::DeskState& state = each.desk->state();
+    window_->Need(state.talk.text);
+    window_->Need(state.filter.text);
+    window_->Need(each.desk->title());
+    if (state.editor) window_->Need(state.editor->text);
+    if (!state.dialog) continue;
+    for (const auto* text : {&state.dialog->title, &state.dialog->lines, &state.dialog->file}) {
+      window_->Need(*text);
+    }
+  }
+}
+
 absl::Status App::Draw(Timestamp now_ns) {
+  NeedFonts();
   if (absl::Status begun = window_->Begin(); !begun.ok()) return begun;
   if (trace_) trace_->Drawing();
   if (std::exchange(leave_field_, false)) ImGui::SetWindowFocus(nullptr);

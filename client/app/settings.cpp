@@ -49,6 +49,8 @@ void Read(TomlTable& table, Settings& settings) {
   if (theme != "dark" && theme != "light") table.Say("theme", "is dark or light");
   settings.light = theme == "light";
   table.Boolean("talk_open", settings.layout.talk_open);
+  table.Text("microphone", settings.voice.microphone);
+  table.Text("loudspeaker", settings.voice.loudspeaker);
   settings.layout.panel_width = static_cast<float>(panel);
   settings.layout.inset_share = static_cast<float>(inset);
   settings.main = main == "map" ? view::Pane::kMap : view::Pane::kVideo;
@@ -93,11 +95,12 @@ absl::Status SaveSettings(const fs::path& file, const Settings& settings) {
   const std::string text = absl::StrFormat(
       "# What saccade-client keeps between two runs.\n[client]\nname = %s\nwidth = %d\nheight = "
       "%d\nmaximised = %s\npanel_width = %.1f\ninset_share = %.3f\nmain = \"%s\"\ntheme = "
-      "\"%s\"\ntalk_open = %s\n",
+      "\"%s\"\ntalk_open = %s\nmicrophone = %s\nloudspeaker = %s\n",
       Quoted(settings.name), settings.window.width, settings.window.height,
       settings.window.maximised ? "true" : "false", settings.layout.panel_width,
       settings.layout.inset_share, settings.main == view::Pane::kMap ? "map" : "video",
-      settings.light ? "light" : "dark", settings.layout.talk_open ? "true" : "false");
+      settings.light ? "light" : "dark", settings.layout.talk_open ? "true" : "false",
+      Quoted(settings.voice.microphone), Quoted(settings.voice.loudspeaker));
   if (Write(file, text)) return absl::OkStatus();
   return absl::UnavailableError(
       absl::StrCat("cannot keep the settings in ", file.string(), ": make that folder writable"));

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "client/talk/voice_room.hpp"
 #include "client/view/desk_state.hpp"
 #include "client/view/layout.hpp"
 #include "client/view/window.hpp"
@@ -17,6 +18,7 @@ struct Settings {
   view::Window::Place window;
   view::LayoutSettings layout;
   view::Pane main = view::Pane::kMap;
+  talk::VoiceOptions voice;
   bool light = false;  // what stands round the panes
 
   absl::Status Validate() const;

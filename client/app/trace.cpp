@@ -6,7 +6,9 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "client/tools/turn.hpp"
 #include "client/tools/words.hpp"
+#include "client/view/panels.hpp"
 
 namespace saccade::app {
 namespace {
@@ -96,6 +98,9 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
                {"editing", state.editor.has_value() || state.dialog.has_value()},
                {"said", told.chat.messages().size()},
                {"paused", told.pause.has_value()},
+               {"voice", desk.voice().Words()},
+               {"voice_problem", desk.voice().problem()},
+               {"speaks", view::SpeakerWords(desk)},
                {"strokes", told.pointers.List().size() - told.pointers.lasers()},
                {"refused",
                 {{"map", state.Refusal("map")},
@@ -105,6 +110,18 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
                {"gaze", told.gaze ? ToString(told.gaze->mode) : ""},
                {"arrived", told.gaze && told.gaze->arrived},
                {"lease", static_cast<int>(desk.pilot().kind())}};
+  if (const auto& area = state.area) {
+    line["area"] = {area->from.x(), area->from.y(), area->to.x(), area->to.y()};
+  }
+  // Where the handle of the selected mark is, in the video as it is shown.
+  const std::optional<Annotation> turnable = desk.Turnable();
+  if (const auto eye = desk.video_view(); turnable && eye) {
+    const view::Placement at = view.VideoIn(map_main ? layout.inset : layout.main);
+    if (const auto pixel = eye->Project(tools::HandlePoint(*turnable))) {
+      line["handle"] = {at.left + (pixel->x() + 0.5) * at.scale,
+                        at.top + (pixel->y() + 0.5) * at.scale};
+    }
+  }
   if (told.statistics) line["tracked_hz"] = told.statistics->tracked_fps_hz;
   if (const auto& pressed = desk.pressed()) {
     line["pressed"] = {pressed->frame_id, pressed->pixel.x(), pressed->pixel.y()};

@@ -12,6 +12,7 @@
 #include "client/net/convert.hpp"
 #include "client/net/picture_reader.hpp"
 #include "saccade/v1/session.grpc.pb.h"
+#include "saccade/v1/talk.grpc.pb.h"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/gaze.hpp"
 
@@ -19,6 +20,23 @@ namespace saccade::net {
 namespace {
 
 constexpr std::chrono::milliseconds kDeadline(3000);
+constexpr std::chrono::milliseconds kVoiceDeadline(1000);  // what is older is of no use
+
+Presence PresenceOf(const v1::PresenceEvent& message) {
+  Presence presence{net::FromProto(message), {}};
+  for (const v1::Participant& each : message.participants()) {
+    if (each.listens()) presence.listeners.push_back(each.participant_id());
+  }
+  return presence;
+}
+
+VoiceNews FromProto(const v1::VoiceEvent& message) {
+  VoiceNews news{message.participant_id(), {}};
+  for (const v1::VoicePacket& packet : message.packets()) {
+    news.packets.push_back({packet.sequence(), packet.capture_ns(), packet.opus()});
+  }
+  return news;
+}
 
 absl::StatusOr<MapChange> FromProto(const v1::MapDelta& message) {
   MapChange change{.generation = message.map_generation(),
@@ -62,10 +80,13 @@ absl::StatusOr<std::vector<PointerNews>> FromProto(const v1::PointerEvent& messa
 
 class Stream::Impl {
  public:
-  Impl(const ConnectionOptions& options, std::string session_id)
+  Impl(const ConnectionOptions& options, std::string session_id, bool voice)
       : options_(options),
         session_id_(std::move(session_id)),
-        stub_(v1::SessionService::NewStub(MakeChannel(options))) {
+        voice_(voice),
+        channel_(MakeChannel(options)),
+        stub_(v1::SessionService::NewStub(channel_)),
+        talk_(v1::TalkService::NewStub(channel_)) {
     Authorise(options_, context_);
   }
 
@@ -81,6 +102,7 @@ class Stream::Impl {
           v1::TOPIC_PICTURE_PAUSE}) {
       request.add_topics(topic);
     }
+    if (voice_) request.add_topics(v1::TOPIC_VOICE);
     const auto reader = stub_->Subscribe(&context_, request);
     v1::Event message;
     absl::Status failure;
@@ -111,6 +133,15 @@ class Stream::Impl {
     return status.ok() ? absl::OkStatus() : Explain(options_, status);
   }
 
+  absl::Status Speak(const v1::SpeakRequest& request) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kVoiceDeadline);
+    Authorise(options_, context);
+    v1::SpeakResponse response;
+    const grpc::Status status = talk_->Speak(&context, request, &response);
+    return status.ok() ? absl::OkStatus() : Explain(options_, status);
+  }
+
   const std::string& session_id() const { return session_id_; }
 
  private:
@@ -136,12 +167,14 @@ class Stream::Impl {
         return Wrap(FromProto(message.pointer()));
       case v1::Event::kChat:
         return std::optional<StreamEvent>(net::FromProto(message.chat().messages()));
+      case v1::Event::kVoice:
+        return std::optional<StreamEvent>(FromProto(message.voice()));
       case v1::Event::kPicturePause:
         return std::optional<StreamEvent>(net::FromProto(message.picture_pause()));
       case v1::Event::kStatistics:
         return std::optional<StreamEvent>(net::FromProto(message.statistics()));
       case v1::Event::kPresence:
-        return std::optional<StreamEvent>(net::FromProto(message.presence()));
+        return std::optional<StreamEvent>(PresenceOf(message.presence()));
       case v1::Event::kEndOfSource:
         return std::optional<StreamEvent>(SourceEnd{message.end_of_source().frames()});
       default:
@@ -157,14 +190,17 @@ class Stream::Impl {
 
   const ConnectionOptions options_;
   const std::string session_id_;
+  const bool voice_;
+  const std::shared_ptr<grpc::Channel> channel_;
   const std::unique_ptr<v1::SessionService::Stub> stub_;
+  const std::unique_ptr<v1::TalkService::Stub> talk_;
   grpc::ClientContext context_;
   PictureReader pictures_;
   AnnotationParts parts_;
 };
 
-Stream::Stream(const ConnectionOptions& options, std::string session_id)
-    : impl_(std::make_unique<Impl>(options, std::move(session_id))) {}
+Stream::Stream(const ConnectionOptions& options, std::string session_id, bool voice)
+    : impl_(std::make_unique<Impl>(options, std::move(session_id), voice)) {}
 Stream::~Stream() = default;
 
 absl::Status Stream::Read(
@@ -181,6 +217,18 @@ absl::Status Stream::Acknowledge(std::uint64_t sequence, bool request_key_frame)
   request.set_request_key_frame(request_key_frame);
   v1::AcknowledgeResponse response;
   return impl_->Call(&v1::SessionService::Stub::Acknowledge, request, response);
+}
+
+absl::Status Stream::Speak(const std::vector<VoicePacket>& packets) {
+  v1::SpeakRequest request;
+  request.set_session_id(impl_->session_id());
+  for (const VoicePacket& packet : packets) {
+    v1::VoicePacket& sent = *request.add_packets();
+    sent.set_sequence(packet.sequence);
+    sent.set_capture_ns(packet.capture_ns);
+    sent.set_opus(packet.opus);
+  }
+  return impl_->Speak(request);
 }
 
 absl::StatusOr<PingTimes> Stream::Ping() {

@@ -12,6 +12,7 @@
 
 #include "client/net/connection.hpp"
 #include "client/net/types.hpp"
+#include "shared/audio/voice_frame.hpp"
 
 namespace saccade::net {
 
@@ -66,10 +67,21 @@ struct PointerNews {
   bool released = false;
 };
 
-using StreamEvent =
-    std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange, GazeSnapshot, Statistics,
-                 std::vector<Participant>, std::vector<PointerNews>, std::vector<ChatMessage>,
-                 PicturePause, SourceEnd>;
+/// Who is here, and which of them have asked for voice.
+struct Presence {
+  std::vector<Participant> participants;
+  std::vector<std::string> listeners;  // participant ids
+};
+
+/// What somebody says. `capture_ns` is of the server's monotonic clock.
+struct VoiceNews {
+  std::string participant_id;
+  std::vector<VoicePacket> packets;
+};
+
+using StreamEvent = std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange,
+                                 GazeSnapshot, Statistics, Presence, std::vector<PointerNews>,
+                                 std::vector<ChatMessage>, PicturePause, VoiceNews, SourceEnd>;
 
 /// Times of one Ping [ns]: `sent` and `answered` on this machine's clock, the others on the
 /// server's.
@@ -85,7 +97,8 @@ class Stream {
   /// Events in flight unacknowledged; acknowledge every quarter of them.
   static constexpr std::uint32_t kWindow = 32;
 
-  Stream(const ConnectionOptions& options, std::string session_id);
+  /// `voice`: asks for voices too.
+  Stream(const ConnectionOptions& options, std::string session_id, bool voice);
   ~Stream();
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
@@ -100,6 +113,8 @@ class Stream {
   /// Everything up to `sequence` has been taken. `request_key_frame`: the decoder lost its state.
   absl::Status Acknowledge(std::uint64_t sequence, bool request_key_frame);
   absl::StatusOr<PingTimes> Ping();
+  /// What was just said here, 1 to 25 packets; DeadlineExceeded after one second.
+  absl::Status Speak(const std::vector<VoicePacket>& packets);
 
  private:
   class Impl;

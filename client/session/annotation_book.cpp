@@ -29,6 +29,11 @@ void AnnotationBook::Put(const Annotation& annotation) {
 void AnnotationBook::Hide(const std::string& id) { leaving_.insert(id); }
 void AnnotationBook::Show(const std::string& id) { leaving_.erase(id); }
 
+void AnnotationBook::PreviewTurn(const std::string& id, const Eigen::Quaterniond& turn) {
+  turned_[id] = turn;
+}
+void AnnotationBook::EndPreview(const std::string& id) { turned_.erase(id); }
+
 void AnnotationBook::AddPending(Annotation guess) {
   const std::string id = guess.id;
   pending_[id] = std::move(guess);
@@ -38,7 +43,10 @@ void AnnotationBook::RemovePending(const std::string& request_id) { pending_.era
 std::vector<Annotation> AnnotationBook::List() const {
   std::vector<Annotation> list;
   for (const auto& [id, annotation] : known_) {
-    if (!leaving_.contains(id)) list.push_back(annotation);
+    if (leaving_.contains(id)) continue;
+    list.push_back(annotation);
+    const auto turned = turned_.find(id);
+    if (turned != turned_.end()) list.back().world_from_mark = turned->second;
   }
   std::sort(list.begin(), list.end(), CreatedBefore);
   return list;

@@ -20,6 +20,10 @@ class AnnotationBook {
   void Hide(const std::string& id);
   void Show(const std::string& id);
 
+  /// Shows it turned so, whatever the server tells, until EndPreview().
+  void PreviewTurn(const std::string& id, const Eigen::Quaterniond& world_from_mark);
+  void EndPreview(const std::string& id);
+
   /// A mark made here that the server has not answered yet; `id` is its request's.
   void AddPending(Annotation guess);
   void RemovePending(const std::string& request_id);
@@ -34,6 +38,7 @@ class AnnotationBook {
   std::map<std::string, Annotation> known_;
   std::map<std::string, Annotation> pending_;
   std::set<std::string> leaving_, gone_;
+  std::map<std::string, Eigen::Quaterniond> turned_;
 };
 
 }  // namespace saccade::session

@@ -22,6 +22,12 @@ absl::Status Session::Ask(Request request) {
   return threads_->Ask(std::move(request));
 }
 
+void Session::Listen(bool listens) { threads_->Listen(listens); }
+
+absl::Status Session::Speak(const std::vector<VoicePacket>& packets) {
+  return threads_->Speak(packets);
+}
+
 std::optional<net::ConnectionOptions> Session::connection() const { return threads_->current(); }
 
 }  // namespace saccade::session

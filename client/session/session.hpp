@@ -5,8 +5,10 @@
 
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "client/net/connection.hpp"
+#include "client/net/stream.hpp"
 #include "client/session/picture_sink.hpp"
 #include "client/session/state.hpp"
 
@@ -17,6 +19,8 @@ struct SessionOptions {
   /// Before each joining, on a thread of the session: finds token and trust, redeems an invite.
   /// True: one waits to be let in. Empty: nothing to do.
   std::function<absl::StatusOr<bool>(net::ConnectionOptions&)> enter;
+  /// What others say, on the thread of the stream. Empty: nobody listens.
+  std::function<void(const net::VoiceNews&)> on_voice;
 };
 
 /// One person's session with one server: joins, subscribes, joins again when the server went away.
@@ -48,6 +52,12 @@ class Session {
   ///   Unavailable        not connected
   ///   ResourceExhausted  64 wait already
   absl::Status Ask(Request request);
+
+  /// Whether voices are asked for: subscribes anew, in the same session.
+  void Listen(bool listens);
+  /// Says it to the others; blocks for a second at most. Any thread. `capture_ns`: of the server's
+  /// clock. Errors as Connection.
+  absl::Status Speak(const std::vector<VoicePacket>& packets);
 
   /// As the calls of this session are made; nothing before it was joined.
   std::optional<net::ConnectionOptions> connection() const;

@@ -13,11 +13,13 @@ constexpr std::size_t kMaxPath = 4000;
 }  // namespace
 
 void State::Begin(const std::string& id, const net::Joined& told) {
+  const bool goes_on = session_id == id;
   session_id = id;
   joined = told;
   source_ended = false;
   gaze.reset();
   pointers.Clear();
+  if (goes_on) return;
   clock.Reset();
   path.clear();
   ++path_version;
@@ -39,8 +41,9 @@ void State::Apply(const net::StreamEvent& event, Timestamp now_ns) {
           gaze = value;
         } else if constexpr (std::is_same_v<T, net::Statistics>) {
           statistics = value;
-        } else if constexpr (std::is_same_v<T, std::vector<net::Participant>>) {
-          participants = value;
+        } else if constexpr (std::is_same_v<T, net::Presence>) {
+          participants = value.participants;
+          listeners = value.listeners;
         } else if constexpr (std::is_same_v<T, std::vector<net::PointerNews>>) {
           pointers.Apply(value, joined.participant_id, now_ns);
         } else if constexpr (std::is_same_v<T, std::vector<net::ChatMessage>>) {

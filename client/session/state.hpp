@@ -45,6 +45,7 @@ class State {
   Timestamp heard_ns = 0;           // when the stream last told something; 0: not yet
   bool source_ended = false;
   std::vector<net::Participant> participants;
+  std::vector<std::string> listeners;  // ids of those who have asked for voice
   std::optional<net::Statistics> statistics;
   std::optional<GazeSnapshot> gaze;
   /// The wearer's large pause: nobody is shown a picture. Nothing: pictures are shown. Over a lost

@@ -73,6 +73,7 @@ void Session::Threads::RunStream(std::stop_token stop) {
     bool was_live = false;
     const absl::Status status = RunOnce(stop, was_live);
     if (stop.stop_requested()) return;
+    if (Renewed()) continue;
     std::string why(status.ok() ? "the server ended the stream" : status.message());
     {
       const std::lock_guard lock(mutex_);
@@ -87,6 +88,30 @@ void Session::Threads::RunStream(std::stop_token stop) {
     if (!SleepFor(stop, wait)) return;
     wait = std::min(2 * wait, kLongestWait);
   }
+}
+
+bool Session::Threads::Renewed() {
+  const std::lock_guard lock(mutex_);
+  if (!std::exchange(renewed_, false)) return false;
+  stream_.reset();
+  return true;
+}
+
+void Session::Threads::Listen(bool listens) {
+  const std::lock_guard lock(mutex_);
+  if (std::exchange(listens_, listens) == listens || stream_ == nullptr) return;
+  renewed_ = true;
+  stream_->Cancel();
+}
+
+absl::Status Session::Threads::Speak(const std::vector<VoicePacket>& packets) {
+  std::shared_ptr<net::Stream> stream;
+  {
+    const std::lock_guard lock(mutex_);
+    stream = stream_;
+  }
+  if (stream == nullptr) return absl::UnavailableError("no connection to the server");
+  return stream->Speak(packets);
 }
 
 absl::Status Session::Threads::Enter(std::stop_token stop, net::ConnectionOptions& connection) {
@@ -109,10 +134,12 @@ absl::Status Session::Threads::RunOnce(std::stop_token stop, bool& was_live) {
   const absl::StatusOr<std::string> id = (*joining)->JoinAnew();
   if (!id.ok()) return id.status();
   connection.session_id = *id;
-  const auto stream = std::make_shared<net::Stream>(connection, *id);
+  std::shared_ptr<net::Stream> stream;
   {
     const std::lock_guard lock(mutex_);
     if (stop.stop_requested()) return absl::CancelledError();
+    stream = std::make_shared<net::Stream>(connection, *id, listens_);
+    renewed_ = false;
     current_ = connection;
     stream_ = stream;
     acknowledger_.emplace(net::Stream::kWindow / 4, MonotonicNow());
@@ -127,6 +154,8 @@ absl::Status Session::Threads::RunOnce(std::stop_token stop, bool& was_live) {
     const Timestamp now_ns = MonotonicNow();
     if (event && std::holds_alternative<net::CodedPicture>(*event)) {
       pictures_.Push(std::get<net::CodedPicture>(*std::move(event)));
+    } else if (event && std::holds_alternative<net::VoiceNews>(*event)) {
+      if (options_.on_voice) options_.on_voice(std::get<net::VoiceNews>(*event));
     } else if (event) {
       Post([event = *std::move(event), now_ns](State& state) { state.Apply(event, now_ns); });
     }

@@ -22,6 +22,8 @@ class Session::Threads {
   std::vector<Answer> Take();
   absl::Status Ask(Request request);
   std::optional<net::ConnectionOptions> current() const;
+  void Listen(bool listens);
+  absl::Status Speak(const std::vector<VoicePacket>& packets);
 
  private:
   void RunStream(std::stop_token stop);
@@ -33,6 +35,8 @@ class Session::Threads {
   void RunEdits(std::stop_token stop);
   /// What was said before.
   void AskForHistory();
+  /// True once after Listen() ended the stream.
+  bool Renewed();
   void Post(Answer answer);
   void SetLink(Link::Kind kind, std::string reason = "");
   bool SleepFor(std::stop_token stop, std::chrono::milliseconds time);
@@ -50,6 +54,8 @@ class Session::Threads {
   std::optional<Acknowledger> acknowledger_;
   Timestamp heard_ns_ = 0, pinged_ns_ = 0;
   std::string ended_;  // why we ended the stream ourselves
+  bool listens_ = false;
+  bool renewed_ = false;  // the stream was ended to ask for something else
 
   std::jthread streaming_, keeping_, editing_;  // last: they use what stands above
 };

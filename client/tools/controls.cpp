@@ -12,6 +12,8 @@ using enum Group;
 constexpr auto kControls = std::to_array<Control>({
     {kSelect, kTool, "Select", "v", "V",
      "click a mark to select it, Shift for several; drag a selected one to move it"},
+    {kArea, kTool, "Select several", "2", "2",
+     "drag a rectangle round marks, or click one after the other"},
     {kLaser, kTool, "Laser pointer", "w", "W",
      "press and move: the others see where you point, until you let go"},
     {kInk, kTool, "Ink", "i", "I", "press and draw in the video: everybody sees the stroke grow"},
@@ -23,7 +25,7 @@ constexpr auto kControls = std::to_array<Control>({
     {kMeasure, kTool, "Distance", "d", "D", "click both ends: the length, and how sure it is"},
     {kCheckList, kTool, "Check list", "j", "J", "click its place, then write what is to be done"},
     {kPicture, kTool, "Picture", "u", "U",
-     "click its place, then name a PNG or JPEG; or drop a file there"},
+     "click its place, then name a picture or a PDF; or drop a file there"},
     {kGaze, kTool, "Look", "g", "G", "click what the camera should look at and hold"},
     {kUndo, kCommand, "Undo", "z", "Z", "take back your last change"},
     {kRedo, kCommand, "Redo", "y", "Y", "do it again"},
@@ -48,8 +50,14 @@ constexpr auto kControls = std::to_array<Control>({
     {kOnlyMine, kMarks, "Only mine", "o", "O", "list and draw only your marks"},
     {kHideMarks, kMarks, "Hide", "m", "M", "draw no marks; again: all"},
     {kSnapshot, kMarks, "Snapshot", "k", "K", "keep the picture with its marks as a PNG"},
+    {kTurnLeft, kKeys, "Turn", ",", ",", "turn the selected arrow or box"},
+    {kTurnRight, kKeys, "Turn", ".", ".", "the other way; Shift: tip it"},
+    {kSelectAll, kKeys, "Select all", "ctrl+a", "^A", "select every mark that is drawn (Ctrl A)"},
+    {kEditText, kKeys, "Edit text", "f2", "F2", "change the text of the selected mark"},
     {kFind, kKeys, "Find", "/", "/", "find marks by text, shape, author"},
     {kMessage, kKeys, "Message", "9", "9", "write a message to everybody there"},
+    {kVoice, kKeys, "Voice", "8", "8", "join the voices, or leave them"},
+    {kMute, kKeys, "Mute", "7", "7", "not heard; again: heard"},
     {kTheme, kKeys, "Light", "5", "5", "a light window; again: a dark one"},
     {kHelp, kKeys, "Help", "?", "?", "what the keys do"},
     {kEscape, kKeys, "Leave", "escape", "Esc", "leave what is under way"},
@@ -76,6 +84,8 @@ std::optional<Action> ActionOf(const KeyPress& press) {
     return std::nullopt;
   }
   if (press.key == "backspace") return kDelete;
+  if (press.key == ";" || press.key == "<") return kTurnLeft;
+  if (press.key == ":" || press.key == ">") return kTurnRight;
   for (const Control& control : kControls) {
     if (press.key == control.key) return control.action;
   }

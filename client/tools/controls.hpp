@@ -12,6 +12,7 @@ namespace saccade::tools {
 enum class Action {
   // What a click in the video or the map does.
   kSelect,
+  kArea,
   kLaser,
   kInk,
   kCube,
@@ -48,8 +49,14 @@ enum class Action {
   kHideMarks,
   kSnapshot,
   // Keys alone.
+  kTurnLeft,
+  kTurnRight,
+  kSelectAll,
+  kEditText,
   kFind,
   kMessage,
+  kVoice,
+  kMute,
   kTheme,
   kHelp,
   kEscape,

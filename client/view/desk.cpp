@@ -1,12 +1,11 @@
 #include "client/view/desk.hpp"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "client/tools/words.hpp"
@@ -17,12 +16,22 @@ namespace {
 constexpr double kFieldOfViewRad = std::numbers::pi / 4;
 constexpr Timestamp kSayAgainNs = 400'000'000;
 
+session::SessionOptions HeardBy(talk::VoiceRoom& voice, session::SessionOptions options) {
+  options.on_voice = [&voice](const net::VoiceNews& news) { voice.Hear(news); };
+  return options;
+}
+
 }  // namespace
 
-Desk::Desk(session::SessionOptions options, std::string title, std::function<void()> wake)
+Desk::Desk(session::SessionOptions options, std::string title, talk::VoiceOptions voice,
+           std::function<void()> wake)
     : title_(std::move(title)),
+      wake_(wake),
       player_(wake),
-      session_(std::move(options), player_, std::move(wake)) {}
+      voice_(std::move(voice), wake),
+      session_(HeardBy(voice_, std::move(options)), player_, std::move(wake)) {}
+
+Desk::~Desk() { voice_.End(session_); }
 
 std::string Desk::title() const {
   const std::string& source = session().joined.source;
@@ -36,9 +45,12 @@ Desk::News Desk::Poll(Timestamp now_ns) {
     has_picture = true;
   }
   changed = pilot_.Check() || changed;
+  changed = voice_.Check(session_, now_ns) || changed;
   // Held still it is said again: after a second without a word it would be gone.
   if (!laser_id_.empty() && now_ns - pointed_ns_ > kSayAgainNs) PointAt(pointed_at_, false);
   TellSketches(now_ns);
+  SendTurns(now_ns);
+  changed = CheckLoading() || changed;
   changed = state_.Expire(now_ns) || changed;
   changed = session().Expire(now_ns) || changed;
   // A still of a map that is gone shows marks where they are not.
@@ -130,47 +142,6 @@ void Desk::Shown(Timestamp shown_ns) {
   }
 }
 
-std::string Desk::WhyNoPicture() const {
-  if (session().pause) return absl::StrCat(tools::PauseWords(*session().pause), ".");
-  return shown() == nullptr ? "There is no picture yet." : "";
-}
-
-void Desk::Freeze(Timestamp now_ns) {
-  if (state_.still) return state_.still.reset();
-  if (const std::string why = WhyNoPicture(); !why.empty()) {
-    return state_.Refuse("Freeze", why, now_ns);
-  }
-  state_.still = Still{*live_, session().features, session().map_revision, now_ns, false};
-  const FrameId id = live_->facts->frame_id;
-  // The same picture as the server kept it: without what the coder lost, where it kept it whole.
-  edits_.FetchStill(id, net::VideoView::kRaw, [this, id](const absl::StatusOr<net::Still>& still) {
-    if (!still.ok() || !state_.still || state_.still->picture.facts->frame_id != id) return;
-    const cv::Mat bytes(1, static_cast<int>(still->png.size()), CV_8UC1,
-                        const_cast<char*>(still->png.data()));
-    cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR);
-    const cv::Mat& old = state_.still->picture.rgba;
-    if (picture.empty() || picture.cols < old.cols || picture.rows < old.rows) return;
-    cv::cvtColor(picture(cv::Rect(0, 0, old.cols, old.rows)), picture, cv::COLOR_BGR2RGBA);
-    state_.still->picture.rgba = picture;
-    state_.still->lossless = true;
-  });
-}
-
-/// The server draws the marks in, as for the wearer.
-void Desk::Snapshot(Timestamp now_ns) {
-  if (const std::string why = WhyNoPicture(); !why.empty()) {
-    return state_.Refuse("Snapshot", why, now_ns);
-  }
-  const FrameId id = shown()->facts->frame_id;
-  edits_.FetchStill(
-      id, net::VideoView::kAugmented, [this](const absl::StatusOr<net::Still>& still) {
-        const std::string words = still.ok()
-                                      ? keep_snapshot(*still, *this)
-                                      : absl::StrCat("No snapshot: ", still.status().message());
-        state_.Refuse("Snapshot", words, MonotonicNow());
-      });
-}
-
 void Desk::Escape() {
   if (state_.editor) {
     state_.editor.reset();
@@ -181,6 +152,12 @@ void Desk::Escape() {
   } else if (state_.ink.drawing()) {
     state_.ink.Cancel();
     EndSketch();
+  } else if (turning_) {
+    DropHandle(false, "");
+  } else if (state_.area) {
+    state_.area.reset();
+  } else if (!laser_id_.empty()) {
+    PointAt(pointed_at_, true);
   } else if (moving_) {
     moving_.reset();
     dragged_to_.reset();
@@ -209,9 +186,9 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
   if (control.group == tools::Group::kHead) return RunHead(action, now_ns);
   switch (action) {
     case kUndo:
-      return edits_.Undo(Tell(control.label));
+      return edits_.Undo(TellWhatStays(control.label));
     case kRedo:
-      return edits_.Redo(Tell(control.label));
+      return edits_.Redo(TellWhatStays(control.label));
     case kDelete:
       return RemoveSelected(now_ns);
     case kCopy:
@@ -245,11 +222,19 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
       return;
     case kSnapshot:
       return Snapshot(now_ns);
+    case kSelectAll:
+      return SelectAll();
     case kFind:
       state_.find = true;
       return;
     case kMessage:
       state_.talk.open = state_.talk.wanted = true;
+      return;
+    case kVoice:
+      return voice_.state() == talk::VoiceRoom::State::kOff ? voice_.Join(session_)
+                                                            : voice_.Leave(session_);
+    case kMute:
+      if (voice_.has_microphone()) voice_.ToggleMute();
       return;
     case kEscape:
       return Escape();
@@ -261,6 +246,14 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
 void Desk::ConfirmReset(bool really, Timestamp /*now_ns*/) {
   state_.confirming_reset = false;
   if (really) edits_.ResetMap(Tell("Reset map"));
+}
+
+session::Edits::Done Desk::TellWhatStays(const Where& where) {
+  return [this, where](const absl::StatusOr<std::string>& done) {
+    const std::string words = done.ok() ? *done : std::string(done.status().message());
+    if (done.ok() && !absl::StrContains(words, "stays: ")) return;
+    state_.Refuse(where, words, MonotonicNow());
+  };
 }
 
 session::Edits::Done Desk::Tell(const Where& where, const std::string& before) {

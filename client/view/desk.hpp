@@ -1,6 +1,8 @@
 #pragma once
 
 #include <functional>
+#include <future>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +14,7 @@
 #include "client/session/latency.hpp"
 #include "client/session/pointing.hpp"
 #include "client/session/session.hpp"
+#include "client/talk/voice_room.hpp"
 #include "client/tools/orbit.hpp"
 #include "client/tools/view.hpp"
 #include "client/view/desk_state.hpp"
@@ -32,10 +35,16 @@ struct Placement {
 class Desk {
  public:
   /// `title`: what it is called until the server has told; `wake` may be called on any thread.
-  Desk(session::SessionOptions options, std::string title, std::function<void()> wake);
+  Desk(session::SessionOptions options, std::string title, talk::VoiceOptions voice,
+       std::function<void()> wake);
+  ~Desk();
 
   const session::State& session() const { return session_.state(); }
   session::State& session() { return session_.state(); }
+  const talk::VoiceRoom& voice() const { return voice_; }
+  void TogglePushToTalk() { voice_.TogglePushToTalk(); }
+  /// The key of push to talk.
+  void PressToTalk(bool pressed) { voice_.Press(pressed); }
   const session::GazePilot& pilot() const { return pilot_; }
   DeskState& state() { return state_; }
   const DeskState& state() const { return state_; }
@@ -69,7 +78,12 @@ class Desk {
 
   /// `where`: of the pointer, in the window.
   void Run(tools::Action action, Timestamp now_ns);
-  void Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px);
+  /// What was held while the button went down; `by_key`: it was Enter.
+  struct Held {
+    bool shift = false, ctrl = false, by_key = false;
+  };
+  void Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px,
+             const Held& held);
   void Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view);
   /// How the button came up: whether the pointer was dragged, where it is in the window, and
   /// whether Shift adds to what is selected.
@@ -109,8 +123,17 @@ class Desk {
   void ConfirmReset(bool really, Timestamp now_ns);
   /// Which frame's picture was last pressed, and where; for tests.
   const std::optional<PixelTarget>& pressed() const { return pressed_pixel_; }
-  /// A drag is of a mark or the laser pointer: it does not turn the map.
-  bool dragging_mark() const { return moving_.has_value() || !laser_id_.empty(); }
+  /// A drag is of a mark, a rectangle or the laser pointer: it does not turn the map.
+  bool dragging_mark() const { return moving_ || turning_ || state_.area || !laser_id_.empty(); }
+  /// What was pressed goes on until it is let go.
+  bool holding() const { return dragging_mark() || state_.ink.drawing(); }
+  /// The one mark that has a handle now.
+  std::optional<Annotation> Turnable() const;
+  /// Turns the selected arrows and boxes by a step, as seen in `view`; false: there are none.
+  bool Turn(int sign, bool tips, const tools::View* view, Timestamp now_ns);
+  void SelectAll();
+  /// What a pinned picture shows (RGBA); null: not there yet, it is asked for.
+  const cv::Mat* PictureOf(const Annotation& mark);
   /// Where the mark that is dragged would be put [m].
   const std::optional<Eigen::Vector3d>& dragged_to() const { return dragged_to_; }
   /// Keeps a picture with its marks as a file, and says where; set by whoever knows where.
@@ -136,6 +159,19 @@ class Desk {
                  const std::string& group, const Where& where);
   void MoveSelected(const std::string& grabbed, const tools::Landing& landing, const Where& where);
   void PlaceDraft(AnnotationDraft draft, const tools::Landing& landing, const Where& where);
+  bool GripHandle(const Eigen::Vector2d& pixel, const tools::View& view, double pick_px);
+  void DragHandle(const Eigen::Vector2d& pixel, const tools::View& view);
+  void DropHandle(bool keep, const Where& where);
+  void SendTurn(const std::string& id, const Eigen::Quaterniond& turn, const std::string& group,
+                const Where& where);
+  void SendTurns(Timestamp now_ns);
+  void SelectArea(const tools::View* view, bool adds, Timestamp now_ns);
+  /// Reads a file beside this thread; `done` on it. One at a time.
+  void Load(const std::string& file, int page,
+            std::function<void(const absl::StatusOr<PicturePtr>&)> done);
+  bool CheckLoading();
+  void LoadForDialog();
+  static AnnotationDraft PictureDraft(const PicturePtr& picture, const std::string& text);
   void Freeze(Timestamp now_ns);
   void Snapshot(Timestamp now_ns);
   void Escape();
@@ -146,13 +182,17 @@ class Desk {
   void Fixate(const GazeTarget& target, const Eigen::Vector3d& point, const Where& where,
               Timestamp now_ns);
   std::string WhyNoHead() const;
+  /// Of undo and redo: also says what of it was not done.
+  session::Edits::Done TellWhatStays(const Where& where);
   /// Shows a refusal where it was asked for.
   session::Edits::Done Tell(const Where& where, const std::string& before = "");
 
   const std::string title_;
+  const std::function<void()> wake_;
   DeskState state_;
   decode::Player player_;
-  session::Session session_;  // after player_: it pushes there
+  talk::VoiceRoom voice_;
+  session::Session session_;  // after player_ and voice_: it pushes there
   session::Edits edits_{session_};
   session::GazePilot pilot_{session_};
   session::LatencyMeter latency_;
@@ -183,7 +223,13 @@ class Desk {
   void BeginSketch();
   void TellSketches(Timestamp now_ns);
   void EndSketch();
-  std::optional<std::string> moving_;  // id of the mark that is dragged
+  std::optional<std::string> moving_;                // id of the mark that is dragged
+  std::optional<Annotation> turning_;                // by its handle
+  std::map<std::string, Eigen::Quaterniond> turns_;  // by keys, not sent yet
+  Timestamp turned_ns_ = 0;
+  std::map<std::string, cv::Mat> pictures_;  // by sha256; empty: asked for, or damaged
+  std::function<void(const absl::StatusOr<PicturePtr>&)> loaded_;
+  std::future<absl::StatusOr<PicturePtr>> loading_;
   std::optional<Eigen::Vector3d> dragged_to_;
 };
 

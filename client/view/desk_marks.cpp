@@ -49,7 +49,7 @@ std::string Desk::WhyNoLanding(Pane pane) const {
 
 void Desk::HoverAt(Pane pane, const std::optional<Eigen::Vector2d>& pixel, const tools::View* view,
                    double pick_px) {
-  if (state_.tool == tools::Action::kSelect) {
+  if (state_.tool == tools::Action::kSelect || state_.tool == tools::Action::kArea) {
     state_.hover.reset();
     const Annotation* picked = nullptr;
     const std::vector<Annotation> drawn = Drawn();
@@ -62,7 +62,8 @@ void Desk::HoverAt(Pane pane, const std::optional<Eigen::Vector2d>& pixel, const
   }
 }
 
-void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px) {
+void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px,
+                 const Held& held) {
   pressed_ = Pressed{LandingAt(pane, pixel, view), ""};
   const decode::Picture* picture = shown();
   if (pane == Pane::kVideo && picture != nullptr) {
@@ -84,8 +85,18 @@ void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* vie
     laser_id_ = net::RandomUuid();
     PointAt(pressed_->landing->target, false);
   }
-  const bool selected = state_.selection.Has(pressed_->picked_id);
-  if (state_.tool == tools::Action::kSelect && selected) moving_ = pressed_->picked_id;
+  const bool selects = state_.tool == tools::Action::kSelect;
+  if (state_.tool == tools::Action::kArea || (selects && held.ctrl)) {
+    state_.area = Area{pane, pixel, pixel};
+    return;
+  }
+  if (!selects || held.shift || view == nullptr) return;
+  if (GripHandle(pixel, *view, pick_px)) return;
+  if (state_.selection.Has(pressed_->picked_id)) {
+    moving_ = pressed_->picked_id;
+  } else if (pressed_->picked_id.empty() && pane == Pane::kVideo && !held.by_key) {
+    state_.area = Area{pane, pixel, pixel};
+  }
 }
 
 void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view) {
@@ -97,6 +108,8 @@ void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view
     }
     TellSketches(MonotonicNow());
   }
+  if (state_.area) state_.area->to = pixel;
+  if (turning_ && view != nullptr) DragHandle(pixel, *view);
   if (laser_id_.empty() || MonotonicNow() - pointed_ns_ < kPointNs) return;
   if (const auto landing = LandingAt(pane, pixel, view)) PointAt(landing->target, false);
 }
@@ -133,6 +146,15 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
     state_.still.reset();
     return;
   }
+  if (turning_) {
+    if (lift.moved && view != nullptr) DragHandle(pixel, *view);
+    return DropHandle(lift.moved, where);
+  }
+  if (state_.area && lift.moved) {
+    state_.area->to = pixel;
+    return SelectArea(view, lift.adds, now_ns);
+  }
+  state_.area.reset();
   if (moving_ && lift.moved) {
     const std::string id = *std::exchange(moving_, std::nullopt);
     const std::optional<tools::Landing> landing = LandingAt(pane, pixel, view);
@@ -153,7 +175,7 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
   }
   const std::optional<AnnotationShape> shape = tools::ShapeOf(state_.tool);
   if (!shape) {
-    if (!lift.adds) state_.selection.Clear();
+    if (!lift.adds && state_.tool != tools::Action::kArea) state_.selection.Clear();
     if (!pressed.picked_id.empty()) state_.selection.Toggle(pressed.picked_id);
     return;
   }

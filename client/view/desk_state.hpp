@@ -35,6 +35,12 @@ struct Still {
   bool lossless = false;  // the server's own, by GetFrame
 };
 
+/// A rectangle that is drawn round marks [px of the pane's view].
+struct Area {
+  Pane pane = Pane::kMap;
+  Eigen::Vector2d from = Eigen::Vector2d::Zero(), to = Eigen::Vector2d::Zero();
+};
+
 /// A note that is written, or a mark's text that is changed.
 struct TextEditor {
   std::optional<tools::Landing> landing;  // of a new note
@@ -52,11 +58,13 @@ struct PlacingDialog {
   tools::Landing landing;
   Pane pane = Pane::kMap;
   std::string title;
-  std::string lines;    // of a check list
-  std::string file;     // of a picture
-  std::string problem;  // what of it cannot be kept
-  bool opened = false;  // has had the keyboard
-  bool finish = false;  // it was asked to be placed; what was typed before it may be on its way
+  std::string lines;     // of a check list
+  std::string file;      // of a picture
+  int page = 1;          // of a PDF
+  bool loading = false;  // the file is being read
+  std::string problem;   // what of it cannot be kept
+  bool opened = false;   // has had the keyboard
+  bool finish = false;   // it was asked to be placed; what was typed before it may be on its way
 };
 
 /// Marks to be put somewhere else, as they were when they were copied.
@@ -100,6 +108,9 @@ class DeskState {
   std::vector<CopiedMark> copied;
   std::vector<Rect> above;  // what lies over the panes, of the picture on the screen
   tools::InkLine ink;
+  std::optional<Area> area;
+  /// Where keys point in the video, as shares of the picture; nothing: the pointer does.
+  std::optional<Eigen::Vector2d> key_place;
   std::optional<tools::Landing> measure_from;  // one end of a distance, until the other is clicked
   /// What the camera was asked to look at, until the server says that it does.
   std::optional<Eigen::Vector3d> asked_in_world;

@@ -1,12 +1,10 @@
-// Strokes while they grow, messages, check lists and pictures that are placed.
+// Strokes while they grow, messages, what is placed by a dialog.
 #include <absl/strings/str_cat.h>
 
 #include <utility>
 
 #include "client/tools/written.hpp"
 #include "client/view/desk.hpp"
-#include "client/view/patch.hpp"
-#include "client/view/picture_file.hpp"
 
 namespace saccade::view {
 
@@ -74,48 +72,6 @@ void Desk::PlaceDraft(AnnotationDraft draft, const tools::Landing& landing, cons
                  if (id.ok()) state_.selection.Only(*id);
                  tell(id);
                });
-}
-
-void Desk::FinishDialog(bool keep) {
-  if (!state_.dialog) return;
-  if (!keep) return state_.dialog.reset();
-  PlacingDialog& dialog = *state_.dialog;
-  AnnotationDraft draft;
-  draft.shape = dialog.shape;
-  draft.text = tools::CleanText(dialog.title);
-  if (dialog.shape == AnnotationShape::kCheckList) {
-    const auto list = tools::ReadList(dialog.title, dialog.lines);
-    if (!list.ok()) return void(dialog.problem = std::string(list.status().message()));
-    draft.check_items = list->items;
-  } else {
-    const auto picture = LoadPicture(tools::CleanText(dialog.file));
-    if (!picture.ok()) return void(dialog.problem = std::string(picture.status().message()));
-    draft.picture = *picture;
-    draft.size_m = kPictureM;
-  }
-  const PlacingDialog done = *std::exchange(state_.dialog, std::nullopt);
-  PlaceDraft(std::move(draft), done.landing, NameOf(done.pane));
-}
-
-void Desk::DropFile(const std::string& file, Pane pane, const Eigen::Vector2d& pixel,
-                    const tools::View* view, Timestamp now_ns) {
-  const Where where = NameOf(pane);
-  if (!session().link.live()) {
-    return state_.Refuse(where, "Not placed: no connection to the server.", now_ns);
-  }
-  const std::optional<tools::Landing> landing = LandingAt(pane, pixel, view);
-  if (!landing) {
-    return state_.Refuse(where, absl::StrCat("Not placed: ", WhyNoLanding(pane)), now_ns);
-  }
-  const auto picture = LoadPicture(file);
-  if (!picture.ok()) {
-    return state_.Refuse(where, absl::StrCat("Not placed: ", picture.status().message()), now_ns);
-  }
-  AnnotationDraft draft;
-  draft.shape = AnnotationShape::kPicture;
-  draft.picture = *picture;
-  draft.size_m = kPictureM;
-  PlaceDraft(std::move(draft), *landing, where);
 }
 
 }  // namespace saccade::view

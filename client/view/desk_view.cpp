@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/tools/turn.hpp"
 #include "client/tools/words.hpp"
 #include "client/view/theme.hpp"
 
@@ -157,7 +158,9 @@ void DeskView::DrawMap(const Rect& rect, const Canvas& canvas, ImDrawList* list)
   list->AddCallback(ImDrawCallback_ResetRenderState, nullptr);
   Painter painter(list, rect, rect.x, rect.y, 1, canvas.scale);
   painter.Axes(WorldAxes(*eye_.camera, eye_.world_from_camera));
+  pictures_.Draw(eye_, painter);
   painter.Draw(MarksIn(eye_), Accented());
+  DrawGrips(Pane::kMap, eye_, painter);
   const auto& gaze = desk_.session().gaze;
   const auto& pose = desk_.session().pose;
   if (gaze && gaze->target_in_world && session::IsPlaced(pose)) {
@@ -187,6 +190,7 @@ void DeskView::DrawVideo(const Rect& rect, const Canvas& canvas, ImDrawList* lis
   DrawFeatures(*picture->facts, *view, painter);
   if (!desk_.same_map()) return;
   painter.Axes(WorldAxes(*view->camera, view->world_from_camera));
+  pictures_.Draw(*view, painter);
   const Marks marks = MarksIn(*view);
   painter.Draw(marks, Accented());
   painter.EdgeArrows(marks.edge_arrows, Accented());
@@ -194,6 +198,20 @@ void DeskView::DrawVideo(const Rect& rect, const Canvas& canvas, ImDrawList* lis
   const tools::InkLine& ink = desk_.state().ink;
   if (ink.drawing()) painter.Line(ink.points(), ColorOf(desk_.state().color_rgba));
   DrawLanding(Pane::kVideo, *view, painter);
+  DrawGrips(Pane::kVideo, *view, painter);
+}
+
+void DeskView::DrawGrips(Pane pane, const tools::View& view, Painter& painter) const {
+  if (const std::optional<Annotation> mark = desk_.Turnable()) {
+    if (const auto handle = view.Project(tools::HandlePoint(*mark))) painter.Handle(*handle);
+  }
+  const DeskState& state = desk_.state();
+  if (state.area && state.area->pane == pane) painter.Area(state.area->from, state.area->to);
+  if (pane == Pane::kVideo && state.key_place && !state.hover) {
+    const CameraIntrinsics& lens = view.camera->intrinsics();
+    painter.Ring(
+        {state.key_place->x() * lens.width - 0.5, state.key_place->y() * lens.height - 0.5}, 0, "");
+  }
 }
 
 /// As measured, or sought in vain, only what this very frame says so of, and where it says. All

@@ -8,6 +8,7 @@
 #include "client/view/desk.hpp"
 #include "client/view/map_scene.hpp"
 #include "client/view/painter.hpp"
+#include "client/view/picture_layer.hpp"
 #include "shared/render/texture.hpp"
 
 namespace saccade::view {
@@ -35,7 +36,7 @@ class DeskView {
   float aspect() const;
 
  private:
-  DeskView(const GlFunctions& gl, Desk& desk) : gl_(gl), desk_(desk) {}
+  DeskView(const GlFunctions& gl, Desk& desk) : gl_(gl), desk_(desk), pictures_(gl, desk) {}
 
   void DrawMap(const Rect& rect, const Canvas& canvas, ImDrawList* list);
   void DrawVideo(const Rect& rect, const Canvas& canvas, ImDrawList* list);
@@ -43,6 +44,9 @@ class DeskView {
   Marks MarksIn(const tools::View& view) const;
   std::vector<std::string> Accented() const;
   void DrawLanding(Pane pane, const tools::View& view, Painter& painter) const;
+  /// What is under way with the selected marks: a handle, a rectangle, the place that keys point
+  /// at.
+  void DrawGrips(Pane pane, const tools::View& view, Painter& painter) const;
   void DrawSight(const tools::View& view, Painter& painter) const;
   std::string Note(Pane pane, Timestamp now_ns) const;
   static void OnMap(const ImDrawList* list, const ImDrawCmd* command);
@@ -50,6 +54,7 @@ class DeskView {
   const GlFunctions& gl_;
   Desk& desk_;
   std::unique_ptr<MapScene> scene_;
+  PictureLayer pictures_;
   std::unique_ptr<Texture> texture_;
   int texture_width_ = 0, texture_height_ = 0;
   const void* on_card_ = nullptr;  // the pixels that the texture has

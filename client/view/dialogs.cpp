@@ -1,4 +1,5 @@
 // The fields in which something is written before it is placed.
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <imgui.h>
 #include <imgui_stdlib.h>
@@ -73,7 +74,7 @@ void DrawDialog(const PanelContext& context, const Rect& within) {
   ImGui::TextUnformatted(list ? "Check list" : "Picture");
   ImGui::PopFont();
   ImGui::TextUnformatted(list ? "Title"
-                              : "PNG or JPEG file, or drop one into the map or the video");
+                              : "PNG, JPEG or PDF file, or drop one into the map or the video");
   ImGui::SetNextItemWidth(-1);
   if (!dialog.opened) ImGui::SetKeyboardFocusHere();
   dialog.opened = true;
@@ -86,10 +87,17 @@ void DrawDialog(const PanelContext& context, const Rect& within) {
            keep;  // with Ctrl
   } else {
     keep = ImGui::InputText("##file", &dialog.file, ImGuiInputTextFlags_EnterReturnsTrue) || keep;
+    if (absl::EndsWithIgnoreCase(dialog.file, ".pdf")) {
+      ImGui::TextUnformatted("Page");
+      ImGui::SetNextItemWidth(8 * ImGui::GetFontSize());
+      ImGui::InputInt("##page", &dialog.page);
+      dialog.page = std::max(dialog.page, 1);
+    }
     ImGui::TextUnformatted("Words under it");
     ImGui::SetNextItemWidth(-1);
     keep = ImGui::InputText("##title", &dialog.title, ImGuiInputTextFlags_EnterReturnsTrue) || keep;
   }
+  if (dialog.loading) Wrapped(Colours().dim, "Reading the file.");
   Wrapped(Colours().warn, dialog.problem);
   ImGui::PushStyleColor(ImGuiCol_Button, Colours().line);
   keep = ImGui::Button(list ? "Place it (Ctrl Enter)" : "Place it (Enter)") || keep;

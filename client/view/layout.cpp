@@ -7,7 +7,7 @@ namespace saccade::view {
 namespace {
 
 constexpr float kHeader = 38, kTabs = 30, kStrip = 26, kTools = 142, kGaze = 236, kMargin = 14;
-constexpr float kTalkHead = 34, kTalk = 210;
+constexpr float kTalkHead = 34, kTalk = 260;
 constexpr float kRoom = 24;  // round the camera: its picture is drawn there
 constexpr std::int64_t kPatienceNs = 500'000'000;
 constexpr float kEdge = 6;  // half of what can be gripped
@@ -37,7 +37,7 @@ Layout LayOut(float width, float height, float scale, bool tabs, float aspect,
   const float most_panel = std::max(width - out.tools.width - width / 3, 1.0f);
   const float panel = std::min(settings.panel_width * scale, most_panel);
   const float gaze = std::min(kGaze * scale, 0.5f * body);
-  const float talk = settings.talk_open ? std::floor(std::min(kTalk * scale, 0.3f * body))
+  const float talk = settings.talk_open ? std::floor(std::min(kTalk * scale, 0.38f * body))
                                         : std::floor(std::min(kTalkHead * scale, 0.1f * body));
   out.panel = {width - panel, top, panel, body - gaze - talk};
   out.talk = {width - panel, out.panel.bottom(), panel, talk};

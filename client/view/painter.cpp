@@ -74,6 +74,30 @@ void Painter::Laser(const Eigen::Vector2d& pixel, ImU32 color, const std::string
   Words({at.x + 11 * size, at.y}, name, color);
 }
 
+void Painter::Handle(const Eigen::Vector2d& pixel) {
+  const ImVec2 at = At(pixel);
+  for (const auto& [color, width] : {std::pair(kHalo, 5.0f), std::pair(kAccent, 2.0f)}) {
+    list_->AddCircle(at, 5 * unit_, color, 16, width * unit_);
+    list_->PathArcTo(at, 11 * unit_, -2.4f, -0.7f, 12);
+    list_->PathStroke(color, 0, width * unit_);
+  }
+}
+
+void Painter::Area(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  const ImVec2 a = At(from.cwiseMin(to)), c = At(from.cwiseMax(to));
+  list_->AddRectFilled(a, c, IM_COL32(0xc4, 0xb0, 0xff, 36));
+  const std::vector<ImVec2> edge = {a, {c.x, a.y}, c, {a.x, c.y}, a};
+  Stroke(edge, kHalo, 4);
+  Dashes(edge, kAccent, 1.6f, 6);
+}
+
+void Painter::Image(unsigned texture, const std::array<Eigen::Vector2d, 4>& corners, ImVec2 first,
+                    ImVec2 last) {
+  list_->AddImageQuad(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture)),
+                      At(corners[0]), At(corners[1]), At(corners[2]), At(corners[3]), first,
+                      {last.x, first.y}, last, {first.x, last.y});
+}
+
 void Painter::Line(const Polyline2& line, ImU32 color, bool dashed) {
   std::vector<ImVec2> points;
   for (const Eigen::Vector2d& pixel : line) points.push_back(At(pixel));

@@ -2,6 +2,7 @@
 
 #include <imgui.h>
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,6 +38,14 @@ class Painter {
   void Ring(const Eigen::Vector2d& at, std::optional<double> radius_px, const std::string& words);
   /// Where somebody points: a disc over a halo, the name beside it.
   void Laser(const Eigen::Vector2d& at, ImU32 color, const std::string& name);
+  /// What turns the selected mark: a ring with an arc round it.
+  void Handle(const Eigen::Vector2d& at);
+  /// A rectangle that is drawn round marks.
+  void Area(const Eigen::Vector2d& from, const Eigen::Vector2d& to);
+  /// A part of a texture, from its corner `first` to `last` (0 to 1), onto four pixels: upper left,
+  /// upper right, lower right, lower left.
+  void Image(unsigned texture, const std::array<Eigen::Vector2d, 4>& corners, ImVec2 first,
+             ImVec2 last);
   void Line(const Polyline2& line, ImU32 color, bool dashed = false);
   void Words(ImVec2 at, const std::string& words, ImU32 color);
 

@@ -37,6 +37,10 @@ void DrawEditor(const PanelContext& context, const Rect& within);
 /// The fields for a check list or a picture that is to be placed; nothing while there is none.
 void DrawDialog(const PanelContext& context, const Rect& within);
 /// What people say, and a field to say something; folded to its head where `rect` is that low.
+/// Joining the voices, mute, push to talk, who is there.
+void DrawVoice(const PanelContext& context);
+/// "● Ann speaks"; empty: nobody does.
+std::string SpeakerWords(const Desk& desk);
 void DrawTalk(const PanelContext& context, const Rect& rect);
 /// What the keys do and what the colours mean, over everything. `open` false: does nothing.
 void DrawHelp(const PanelContext& context, bool& open);

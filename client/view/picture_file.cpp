@@ -12,6 +12,8 @@
 #include <system_error>
 #include <vector>
 
+#include "client/view/pdf_page.hpp"
+
 namespace saccade::view {
 namespace {
 
@@ -79,9 +81,9 @@ PicturePtr Fitted(cv::Mat picture) {
 
 }  // namespace
 
-absl::StatusOr<PicturePtr> LoadPicture(const std::string& file) {
+absl::StatusOr<PicturePtr> LoadPicture(const std::string& file, int page) {
   namespace fs = std::filesystem;
-  if (file.empty()) return absl::InvalidArgumentError("name a PNG or JPEG file.");
+  if (file.empty()) return absl::InvalidArgumentError("name a PNG, JPEG or PDF file.");
   std::error_code failed;
   if (!fs::is_regular_file(file, failed)) {
     return absl::NotFoundError(absl::StrCat("there is no file ", file, "."));
@@ -90,11 +92,17 @@ absl::StatusOr<PicturePtr> LoadPicture(const std::string& file) {
     return absl::InvalidArgumentError(absl::StrCat(file, " is larger than 64 MiB."));
   }
   std::ifstream in(file, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
   if (!in) return absl::NotFoundError(absl::StrCat(file, " cannot be read."));
+  if (absl::StartsWith(bytes, "%PDF-")) {
+    absl::StatusOr<std::string> drawn = DrawPdfPage(file, page);
+    if (!drawn.ok()) return drawn.status();
+    bytes = *std::move(drawn);
+  }
   const bool known =
       absl::StartsWith(bytes, "\x89PNG\r\n\x1a\n") || absl::StartsWith(bytes, "\xff\xd8\xff");
-  if (!known) return absl::InvalidArgumentError(absl::StrCat(file, " is no PNG and no JPEG."));
+  if (!known)
+    return absl::InvalidArgumentError(absl::StrCat(file, " is no PNG, no JPEG and no PDF."));
   const cv::Mat picture = Decoded(bytes);
   if (picture.empty()) {
     return absl::InvalidArgumentError(absl::StrCat(file, " is damaged: it cannot be decoded."));

@@ -1,6 +1,7 @@
 #include "client/view/pointer.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace saccade::view {
 namespace {
@@ -83,6 +84,7 @@ void Pointer::Handle(const InputEvent& event, const Layout& layout, Desk& desk,
       break;
     }
     case Kind::kKey:
+    case Kind::kLet:
       break;
   }
   last_x_ = event.x;
@@ -105,7 +107,8 @@ void Pointer::Press(const InputEvent& event, const Layout& layout, Desk& desk,
   const std::optional<Target> target = PaneAt(event.x, event.y, layout, desk);
   if (!target) return;
   target_ = *target;
-  if (target->pane == Pane::kMap && (event.button != 0 || event.shift)) {
+  const bool area = event.ctrl || desk.state().tool == tools::Action::kArea;
+  if (target->pane == Pane::kMap && (event.button != 0 || (event.shift && !area))) {
     what_ = What::kPan;
     return;
   }
@@ -113,12 +116,14 @@ void Pointer::Press(const InputEvent& event, const Layout& layout, Desk& desk,
   const Place place = PlaceAt(event.x, event.y, target_, desk, view, layout.scale);
   if (!place.inside) return;
   what_ = What::kPane;
-  desk.Press(target_.pane, place.pixel, place.view ? &*place.view : nullptr, place.pick_px);
+  desk.Press(target_.pane, place.pixel, place.view ? &*place.view : nullptr, place.pick_px,
+             {.shift = event.shift, .ctrl = event.ctrl});
 }
 
 void Pointer::Move(const InputEvent& event, const Layout& layout, Desk& desk, const DeskView& view,
                    LayoutSettings& settings, bool over_panes) {
   const float dx = event.x - last_x_, dy = event.y - last_y_;
+  desk.state().key_place.reset();
   moved_ = moved_ || std::hypot(event.x - start_x_, event.y - start_y_) > kClick * layout.scale;
   over_edge_ = what_ == What::kPanelEdge || what_ == What::kInsetEdge;
   switch (what_) {
@@ -171,7 +176,8 @@ void Pointer::Release(const InputEvent& event, const Layout& layout, Desk& desk,
   if (what != What::kPane && !adds) return;
   const Place place = PlaceAt(event.x, event.y, target_, desk, view, layout.scale);
   if (adds) {
-    desk.Press(target_.pane, place.pixel, place.view ? &*place.view : nullptr, place.pick_px);
+    desk.Press(target_.pane, place.pixel, place.view ? &*place.view : nullptr, place.pick_px,
+               {.shift = true});
   }
   desk.Release(target_.pane, place.pixel, place.view ? &*place.view : nullptr,
                {moved_, event.x, event.y, event.shift || adds}, now_ns);
@@ -191,24 +197,58 @@ void Pointer::Paste(const Layout& layout, Desk& desk, const DeskView& view, Time
   desk.Paste(target->pane, pixel, place.view ? &*place.view : nullptr, now_ns);
 }
 
-bool Pointer::HandleKey(const InputEvent& event, const Layout& layout, Desk& desk,
-                        const DeskView& view, Timestamp now_ns) {
-  const std::string& key = event.key.key;
-  if (event.key.ctrl || event.key.alt || event.key.super) return false;
-  if (key == "enter") {
-    if (event.repeat) return true;
-    const Target target{desk.state().main, layout.main};
-    const float x = layout.main.x + 0.5f * layout.main.width;
-    const float y = layout.main.y + 0.5f * layout.main.height;
-    const Place place = PlaceAt(x, y, target, desk, view, layout.scale);
-    if (!place.inside) return true;
-    const tools::View* eye = place.view ? &*place.view : nullptr;
-    desk.Press(target.pane, place.pixel, eye, place.pick_px);
-    desk.Release(target.pane, place.pixel, eye, {false, x, y, event.shift}, now_ns);
-    return true;
+Pointer::KeyPlace Pointer::KeyPlaceOf(const Layout& layout, const Desk& desk,
+                                      const DeskView& view) {
+  const Rect& main = layout.main;
+  KeyPlace at{{desk.state().main, main}, main.x + 0.5f * main.width, main.y + 0.5f * main.height};
+  const decode::Picture* picture = desk.shown();
+  const auto& place = desk.state().key_place;
+  if (at.target.pane == Pane::kVideo && place && picture != nullptr) {
+    const Placement video = view.VideoIn(main);
+    at.x = video.left + video.scale * static_cast<float>(place->x() * picture->rgba.cols);
+    at.y = video.top + video.scale * static_cast<float>(place->y() * picture->rgba.rows);
   }
+  return at;
+}
+
+void Pointer::Enter(const InputEvent& event, const KeyPlace& at, float scale, Desk& desk,
+                    const DeskView& view, Timestamp now_ns) {
+  const Place place = PlaceAt(at.x, at.y, at.target, desk, view, scale);
+  const tools::View* eye = place.view ? &*place.view : nullptr;
+  const Pane pane = at.target.pane;
+  if (held_by_key_) {
+    desk.Release(*std::exchange(held_by_key_, std::nullopt), place.pixel, eye,
+                 {true, at.x, at.y, event.shift}, now_ns);
+    return;
+  }
+  if (!place.inside) return;
+  desk.Press(pane, place.pixel, eye, place.pick_px,
+             {.shift = event.shift, .ctrl = false, .by_key = true});
+  if (desk.holding()) {
+    held_by_key_ = pane;
+    return desk.state().Refuse(pane == Pane::kMap ? "map" : "video",
+                               "Held: move, then Enter lets go; Esc gives up.", now_ns);
+  }
+  desk.Release(pane, place.pixel, eye, {false, at.x, at.y, event.shift}, now_ns);
+}
+
+bool Pointer::MoveKeyPlace(const std::string& key, bool far, Desk& desk) {
+  const double step = far ? 0.06 : 0.01;  // of the picture
+  Eigen::Vector2d by = Eigen::Vector2d::Zero();
+  if (key == "left") by.x() = -step;
+  if (key == "right") by.x() = step;
+  if (key == "up") by.y() = -step;
+  if (key == "down") by.y() = step;
+  if (by.isZero()) return false;
+  auto& place = desk.state().key_place;
+  const Eigen::Vector2d to = place.value_or(Eigen::Vector2d(0.5, 0.5)) + by;
+  place = Eigen::Vector2d(to.cwiseMax(0.01).cwiseMin(0.99));
+  return true;
+}
+
+bool Pointer::MoveEye(const std::string& key, bool pans, Desk& desk) {
   const auto arrow = [&](double right, double down) {
-    if (event.shift) {
+    if (pans) {
       desk.orbit().Pan(0.05 * right, 0.05 * down);
     } else {
       desk.orbit().Rotate(kTurnRad * right, -kTurnRad * down);
@@ -230,6 +270,30 @@ bool Pointer::HandleKey(const InputEvent& event, const Layout& layout, Desk& des
     return false;
   }
   desk.Hold();
+  return true;
+}
+
+bool Pointer::HandleKey(const InputEvent& event, const Layout& layout, Desk& desk,
+                        const DeskView& view, Timestamp now_ns) {
+  const std::string& key = event.key.key;
+  if (event.key.ctrl || event.key.alt || event.key.super) return false;
+  if (key == "enter") {
+    if (!event.repeat) {
+      Enter(event, KeyPlaceOf(layout, desk, view), layout.scale, desk, view, now_ns);
+    }
+    return true;
+  }
+  const bool video = desk.state().main == Pane::kVideo;
+  const bool moved = video && MoveKeyPlace(key, event.shift, desk);
+  if (!moved && !MoveEye(key, event.shift, desk)) return false;
+  const KeyPlace at = KeyPlaceOf(layout, desk, view);
+  const Place place = PlaceAt(at.x, at.y, at.target, desk, view, layout.scale);
+  const tools::View* eye = place.view ? &*place.view : nullptr;
+  if (held_by_key_ == at.target.pane) {
+    desk.Drag(at.target.pane, place.pixel, eye);
+  } else if (moved && place.inside) {
+    desk.HoverAt(at.target.pane, place.pixel, eye, place.pick_px);
+  }
   return true;
 }
 

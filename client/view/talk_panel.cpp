@@ -74,7 +74,9 @@ void DrawTalk(const PanelContext& context, const Rect& rect) {
   const std::size_t unread = state.chat.Unread(state.joined.participant_id);
   std::string head = absl::StrCat(talk.open ? "▾ " : "▸ ", "Talk");
   if (unread > 0) absl::StrAppend(&head, "  ", unread, " new");
-  if (!talk.open && !state.chat.messages().empty()) {
+  if (const std::string speaks = SpeakerWords(desk); !talk.open && !speaks.empty()) {
+    absl::StrAppend(&head, "  ", speaks);
+  } else if (!talk.open && !state.chat.messages().empty()) {
     const net::ChatMessage& last = state.chat.messages().back();
     absl::StrAppend(&head, "  ", last.display_name, ": ", last.text);
   }
@@ -86,6 +88,7 @@ void DrawTalk(const PanelContext& context, const Rect& rect) {
   if (!talk.open) talk.writing = false;
   if (talk.open) {
     desk.session().chat.MarkRead();
+    DrawVoice(context);
     const float field =
         (desk.state().selection.empty() ? 1.0f : 2.0f) * ImGui::GetFrameHeightWithSpacing() +
         (talk.problem.empty() ? 0.0f : 2 * ImGui::GetTextLineHeightWithSpacing());

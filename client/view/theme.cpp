@@ -1,7 +1,13 @@
 #include "client/view/theme.hpp"
 
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
+#include <map>
 #include <string>
+#include <vector>
+
+#include "client/view/system_fonts.hpp"
 
 namespace saccade::view {
 namespace {
@@ -19,6 +25,15 @@ ImFont* Load(const char* name, float size_px) {
   config.OversampleH = 2;
   config.PixelSnapH = true;
   return ImGui::GetIO().Fonts->AddFontFromFileTTF(file.c_str(), size_px, &config, kRanges);
+}
+
+/// Into the font that was loaded last. Ranges have to live until the texture is made.
+void Merge(const FontFile& file, const std::vector<ImWchar>& ranges, float size_px) {
+  ImFontConfig config;
+  config.MergeMode = true;
+  config.PixelSnapH = true;
+  config.FontNo = file.index;
+  ImGui::GetIO().Fonts->AddFontFromFileTTF(file.path.c_str(), size_px, &config, ranges.data());
 }
 
 const Palette* current = &kDark;  // main thread
@@ -43,7 +58,14 @@ ImU32 ColorOf(FeatureState state) {
   return IM_COL32(0xff, 0xd8, 0x4d, 255);
 }
 
-absl::Status ApplyTheme(float scale, bool light, Fonts& fonts) {
+bool IsAlwaysThere(unsigned character) {
+  for (const ImWchar* range = kRanges; *range != 0; range += 2) {
+    if (character >= range[0] && character <= range[1]) return true;
+  }
+  return false;
+}
+
+absl::Status ApplyTheme(float scale, bool light, const std::set<ImWchar>& needed, Fonts& fonts) {
   current = light ? &kLight : &kDark;
   ImGuiStyle style;
   style.WindowRounding = style.ChildRounding = 0;
@@ -76,10 +98,26 @@ absl::Status ApplyTheme(float scale, bool light, Fonts& fonts) {
   Colour(ImGuiCol_NavHighlight, Colours().accent);
   Colour(ImGuiCol_TextSelectedBg,
          light ? IM_COL32(0x5a, 0x3f, 0xb3, 70) : IM_COL32(0xc4, 0xb0, 0xff, 90));
-  ImGui::GetIO().Fonts->Clear();
-  fonts.text = Load("DejaVuSans.ttf", kTextPx * scale);
-  fonts.bold = Load("DejaVuSans-Bold.ttf", kTextPx * scale);
-  if (fonts.text != nullptr && fonts.bold != nullptr) return absl::OkStatus();
+  const float size_px = kTextPx * scale;
+  std::map<FontFile, std::vector<ImWchar>> ranges;  // by the font that has them
+  for (const ImWchar character : needed) {
+    if (const auto file = FontWith(character)) {
+      ranges[*file].insert(ranges[*file].end(), {character, character});
+    }
+  }
+  for (auto& [file, characters] : ranges) characters.push_back(0);
+  ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
+  for (const bool merged : {true, false}) {
+    atlas.Clear();
+    fonts.bold = Load("DejaVuSans-Bold.ttf", size_px);
+    fonts.text = Load("DejaVuSans.ttf", size_px);
+    if (fonts.text == nullptr || fonts.bold == nullptr) break;
+    if (merged) {
+      for (const auto& [file, characters] : ranges) Merge(file, characters, size_px);
+    }
+    ImGui::GetIO().FontDefault = fonts.text;
+    if (atlas.Build() || !merged) return absl::OkStatus();
+  }
   return absl::NotFoundError(std::string("no fonts in ") + kFolder + ": install fonts-dejavu-core");
 }
 

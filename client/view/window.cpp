@@ -8,13 +8,16 @@
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
+#include <imgui_internal.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace saccade::view {
 namespace {
 
+constexpr std::size_t kMostNeeded = 3000;  // characters
 constexpr int kLeastWidth = 640, kLeastHeight = 400;
 std::string last_error;  // GLFW's own words; main thread
 
@@ -85,6 +88,7 @@ void Window::Listen() {
     event.kind = action == GLFW_PRESS ? InputEvent::Kind::kPress : InputEvent::Kind::kRelease;
     event.button = button;
     event.shift = (mods & GLFW_MOD_SHIFT) != 0;
+    event.ctrl = (mods & (GLFW_MOD_CONTROL | GLFW_MOD_SUPER)) != 0;
     Self(w)->Add(event);
   });
   glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double /*x*/, double /*y*/) {
@@ -107,7 +111,10 @@ void Window::Listen() {
   glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { Self(w)->refresh_ = true; });
   glfwSetFramebufferSizeCallback(window_,
                                  [](GLFWwindow* w, int, int) { Self(w)->refresh_ = true; });
-  glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) { Self(w)->refresh_ = true; });
+  glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int focused) {
+    Self(w)->refresh_ = true;
+    if (focused == 0) Self(w)->Add({.kind = InputEvent::Kind::kLet});
+  });
 }
 
 void Window::Add(InputEvent event) {
@@ -120,13 +127,17 @@ void Window::Add(InputEvent event) {
 
 void Window::OnKey(int key, int scancode, int action, int mods) {
   repeating_ = action == GLFW_REPEAT;
-  if (action == GLFW_RELEASE) return refresh_ = true, void();
+  if (action == GLFW_RELEASE) {
+    refresh_ = true;
+    if (key == GLFW_KEY_SPACE) Add({.kind = InputEvent::Kind::kLet});
+    return;
+  }
   static constexpr std::pair<int, const char*> kNames[] = {
       {GLFW_KEY_DELETE, "delete"}, {GLFW_KEY_BACKSPACE, "backspace"},
       {GLFW_KEY_ESCAPE, "escape"}, {GLFW_KEY_TAB, "tab"},
       {GLFW_KEY_ENTER, "enter"},   {GLFW_KEY_LEFT, "left"},
       {GLFW_KEY_RIGHT, "right"},   {GLFW_KEY_UP, "up"},
-      {GLFW_KEY_DOWN, "down"}};
+      {GLFW_KEY_DOWN, "down"},     {GLFW_KEY_F2, "f2"}};
   InputEvent event;
   event.kind = InputEvent::Kind::kKey;
   event.repeat = repeating_;
@@ -152,6 +163,8 @@ void Window::OnCharacter(unsigned codepoint) {
   InputEvent event;
   event.kind = InputEvent::Kind::kKey;
   event.repeat = repeating_;
+  event.shift = glfwGetKey(window_, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
+                glfwGetKey(window_, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
   event.key.key = c == '=' ? "+" : std::string(1, c);
   Add(std::move(event));
 }
@@ -164,6 +177,20 @@ void Window::Wait(double timeout_s) {
   }
 }
 
+void Window::Need(const std::string& text) {
+  for (const char* at = text.c_str(); *at != 0;) {
+    if (static_cast<unsigned char>(*at) < 0x80) {
+      ++at;
+      continue;
+    }
+    unsigned character = 0;
+    at += std::max(ImTextCharFromUtf8(&character, at, nullptr), 1);
+    if (character > IM_UNICODE_CODEPOINT_MAX || IsAlwaysThere(character)) continue;
+    if (needed_.size() >= kMostNeeded) return;  // the texture of a font has its bounds
+    if (needed_.insert(static_cast<ImWchar>(character)).second) fonts_stale_ = true;
+  }
+}
+
 void Window::Wake() { glfwPostEmptyEvent(); }
 
 std::vector<InputEvent> Window::TakeInput() { return std::exchange(input_, {}); }
@@ -173,12 +200,13 @@ void Window::Close() { glfwSetWindowShouldClose(window_, GLFW_TRUE); }
 
 absl::Status Window::Begin() {
   const float now = scale();
-  if (std::abs(now - fonts_scale_) > 0.01f || light_ != light_shown_) {
+  if (std::abs(now - fonts_scale_) > 0.01f || light_ != light_shown_ || fonts_stale_) {
     if (fonts_scale_ > 0) ImGui_ImplOpenGL3_DestroyFontsTexture();
-    if (absl::Status themed = ApplyTheme(now, light_, fonts_); !themed.ok()) return themed;
+    if (absl::Status themed = ApplyTheme(now, light_, needed_, fonts_); !themed.ok()) return themed;
     if (fonts_scale_ > 0) ImGui_ImplOpenGL3_CreateFontsTexture();
     fonts_scale_ = now;
     light_shown_ = light_;
+    fonts_stale_ = false;
   }
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();

@@ -3,6 +3,7 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,15 +17,17 @@ namespace saccade::view {
 
 /// Something a person did, in the order in which it happened, with the pointer where it was then.
 struct InputEvent {
-  enum class Kind { kPress, kRelease, kMove, kScroll, kKey, kLeave, kDrop };
+  enum class Kind { kPress, kRelease, kMove, kScroll, kKey, kLet, kLeave, kDrop };
   Kind kind = Kind::kMove;
   float x = 0, y = 0;  // in the window
   int button = 0;      // 0 left, 1 right, 2 middle
   float scroll = 0;    // notches; up is above 0
-  bool shift = false;
-  std::string file{};     // kDrop
-  bool repeat = false;    // kKey
-  tools::KeyPress key{};  // kKey; besides the controls' keys "left" ... "down", "+", "-", "enter"
+  bool shift = false, ctrl = false;
+  std::string file{};   // kDrop
+  bool repeat = false;  // kKey
+  // kLet: Space was let go, or the keyboard went to another window.
+  tools::KeyPress
+      key{};  // kKey; besides the controls' keys "left" ... "down", "+", "-", "enter", " "
 };
 
 /// The window, its OpenGL 3.3 context and Dear ImGui in it. All of it on the main thread, but
@@ -49,6 +52,9 @@ class Window {
   /// Ends a Wait(), from any thread.
   static void Wake();
   void SetLight(bool light) { light_ = light; }
+  /// `text` (UTF-8) is to be shown: characters that no font was loaded for are looked for in the
+  /// system's, before the next picture.
+  void Need(const std::string& text);
   bool light() const { return light_; }
   /// What happened since the last call.
   std::vector<InputEvent> TakeInput();
@@ -82,6 +88,8 @@ class Window {
   GlFunctions gl_;
   Fonts fonts_;
   float fonts_scale_ = 0;
+  std::set<ImWchar> needed_;  // beside what is always there
+  bool fonts_stale_ = false;
   bool light_ = false, light_shown_ = false;
   bool imgui_ = false, refresh_ = true, repeating_ = false;
   std::vector<InputEvent> input_;

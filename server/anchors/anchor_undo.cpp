@@ -17,6 +17,22 @@ RecordPtr Copy(const AnchorRecord* record) {
 
 std::uint64_t EndId(const MeasureEnd* end) { return end ? end->place.id : 0; }
 
+std::string NameOf(const EditStep& step) {
+  return ShortName((step.after ? step.after : step.before)->annotation);
+}
+
+/// What of a group stays as it is, and why; empty if all went.
+std::string SayKept(const std::vector<std::string>& names) {
+  constexpr std::size_t kNamed = 3;
+  if (names.empty()) return "";
+  std::string text = "; somebody else changed since, and so stays: ";
+  for (std::size_t i = 0; i < std::min(names.size(), kNamed); ++i) {
+    absl::StrAppend(&text, i > 0 ? ", " : "", names[i]);
+  }
+  if (names.size() > kNamed) absl::StrAppend(&text, " and ", names.size() - kNamed, " more");
+  return text;
+}
+
 }  // namespace
 
 /// Whether `wanted` fits into the quotas in place of `live` (null: it is new).
@@ -138,6 +154,7 @@ absl::StatusOr<AnnotationEdit> AnchorManager::TakeBack(bool undo, const Editor& 
   const std::vector<EditStepPtr> steps = NewestGroup(from);
   const std::uint64_t before = next_sequence_ - 1;
   std::vector<AnnotationEdit> edits;
+  std::vector<std::string> kept;
   absl::Status skipped;
   for (const EditStepPtr& step : steps) {
     absl::StatusOr<AnnotationEdit> edit = TakeBackStep(undo, step, editor);
@@ -145,6 +162,7 @@ absl::StatusOr<AnnotationEdit> AnchorManager::TakeBack(bool undo, const Editor& 
       edits.push_back(*std::move(edit));
     } else if (absl::IsFailedPrecondition(edit.status())) {
       skipped = edit.status();
+      kept.push_back(NameOf(*step));
     } else {  // all or nothing
       RollBack(before);
       return edit.status();
@@ -156,7 +174,7 @@ absl::StatusOr<AnnotationEdit> AnchorManager::TakeBack(bool undo, const Editor& 
   for (AnnotationEdit& edit : edits) all.with.push_back(std::move(edit.change));
   if (steps.size() > 1) {
     all.description = absl::StrCat(undo ? "took back " : "did again ", all.with.size() + 1, " of ",
-                                   steps.size(), " changes made together");
+                                   steps.size(), " changes made together", SayKept(kept));
   }
   return all;
 }

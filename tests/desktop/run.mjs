@@ -89,6 +89,7 @@ context.check = (name, ok, figures) => {
   console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
   if (!ok) ++context.failures;
 };
+context.ask = ask;
 context.annotations = () => ask('annotations', 'list');
 context.map = () => ask('map');
 context.status = () => ask('status');

@@ -5,6 +5,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { startServer } from '../../web/test/browser/server.mjs';
 import { covered } from './clicks.mjs';
+import { runMarks } from './marks.mjs';
 import { Desktop } from './desktop.mjs';
 import { Screen } from './screen.mjs';
 
@@ -31,6 +32,7 @@ export async function runWork(context) {
     await ink(context);
     await undo(context);
     await shapes(context);
+    await runMarks(context, { findObject, marked, idsOf });
     await laser(context);
     await head(context);
     await tabs(context);

@@ -20,9 +20,9 @@ constexpr auto kServerOrder = std::to_array<string_view>(
      "wearable", "overlay", "encode", "store",   "identity", "rpc",     "wear",
      "audio",    "gateway", "eval",   "app"});
 constexpr auto kClientOrder =
-    std::to_array<string_view>({"net", "session", "decode", "tools", "view", "cli", "app"});
+    std::to_array<string_view>({"net", "session", "talk", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder = std::to_array<string_view>(
-    {"version", "io", "geometry", "time", "camera", "scene", "marks", "wire", "render"});
+    {"version", "io", "geometry", "time", "audio", "camera", "scene", "marks", "wire", "render"});
 
 // Folders that see less than what is above them: only snapshots, packets and commands.
 struct Restriction {
@@ -53,9 +53,9 @@ const std::vector<Home>& Homes() {
       {"cjose/", {"server/identity"}},
       {"curl/", {"server/identity"}},
       {"qrencode.h", {"shared/io"}},
-      {"alsa/", {"server/audio"}},
-      {"opus.h", {"server/audio"}},
-      {"speex/", {"server/audio"}},
+      {"alsa/", {"shared/audio"}},
+      {"opus.h", {"shared/audio"}},
+      {"speex/", {"shared/audio"}},
       {"wels/", {"server/encode", "client/decode"}},
       {"GL/osmesa.h", {"server/gl"}},
       {"EGL/", {"server/gl"}},
@@ -65,7 +65,7 @@ const std::vector<Home>& Homes() {
       {"hb.h", {"server/overlay"}},
       {"ft2build.h", {"server/overlay"}},
       {"fribidi.h", {"server/overlay"}},
-      {"fontconfig/", {"server/overlay"}},
+      {"fontconfig/", {"server/overlay", "client/view"}},
       {"libavformat/", {"server/capture"}},
       {"libavcodec/", {"server/capture"}},
       {"seccomp.h", {"server/capture"}},

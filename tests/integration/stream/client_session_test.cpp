@@ -155,9 +155,9 @@ TEST(ClientSession, AListIsTickedMarksOfOneGroupGoTogetherAndAStrokeIsSeenToGrow
     }
   }
   ASSERT_TRUE(expert.Until([&] { return ids.size() == 3; }));
-  other.edits().Tick(ids[0], 1, true, [](const auto& done) { ASSERT_TRUE(done.ok()); });
+  other.edits().Tick(ids[1], 1, true, [](const auto& done) { ASSERT_TRUE(done.ok()); });
   ASSERT_TRUE(expert.Until([&] {
-    const Annotation* mark = expert.state().annotations.Find(ids[0]);
+    const Annotation* mark = expert.state().annotations.Find(ids[1]);
     return mark != nullptr && mark->check_items && (*mark->check_items)[1].done;
   }));
   session::Pointing stroke(net::RandomUuid(), 0xff9a3dff);
@@ -169,9 +169,20 @@ TEST(ClientSession, AListIsTickedMarksOfOneGroupGoTogetherAndAStrokeIsSeenToGrow
   ASSERT_TRUE(other.Until([&] { return !other.state().pointers.List().empty(); }));
   EXPECT_TRUE(other.state().pointers.List()[0].sketch);
   EXPECT_GE(other.state().pointers.List()[0].points_in_world.size(), 2u);
-  expert.edits().Undo([](const auto& done) { ASSERT_TRUE(done.ok()) << done.status(); });
-  ASSERT_TRUE(expert.Until([&] { return expert.state().annotations.size() == 1; }))
-      << "one step took both back";
+  std::string said;
+  const auto undo = [&] {
+    said.clear();
+    expert.edits().Undo([&said](const auto& done) { said = done.ok() ? *done : "refused"; });
+    return expert.Until([&said] { return !said.empty(); });
+  };
+  ASSERT_TRUE(undo());
+  EXPECT_THAT(said, ::testing::HasSubstr("1 of 2")) << "the other one ticked a line of one";
+  EXPECT_THAT(said, ::testing::HasSubstr(ids[1].substr(0, 8))) << "which stays, and is named";
+  ASSERT_TRUE(expert.Until([&] { return expert.state().annotations.Find(ids[2]) == nullptr; }));
+  ASSERT_NE(expert.state().annotations.Find(ids[1]), nullptr);
+  ASSERT_TRUE(undo());
+  ASSERT_TRUE(expert.Until([&] { return expert.state().annotations.size() == 1; }));
+  EXPECT_NE(expert.state().annotations.Find(ids[1]), nullptr);
 }
 
 TEST(ClientSession, WhatIsRefusedIsSaidAndTakenBack) {

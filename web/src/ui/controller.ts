@@ -55,7 +55,10 @@ export class Controller implements ToolActions, AnnotationActions {
     switch (command) {
       case 'undo':
       case 'redo':
-        void attempt(state, command, () => this.edits[command]());
+        void attempt(state, command, async () => {
+          const words = await this.edits[command]();
+          if (words.includes('stays: ')) state.refuse(command, words);
+        });
         break;
       case 'delete':
         this.with_.selected.remove();

@@ -195,6 +195,27 @@ TEST_F(Marks, OfAGroupWhatSomebodyElseChangedStays) {
   EXPECT_EQ(manager_.Latest()->front().id, a);
 }
 
+TEST_F(Marks, AnothersTickOnOneOfAGroupKeepsThatOneAloneFromUndo) {
+  Editor group = Person("ann");
+  const std::string note = Make(AnnotationShape::kNote, group);
+  const std::string list = Make(AnnotationShape::kCheckList, group);
+  group.edit_group = "colour";
+  ASSERT_TRUE(Change(note, group, "oil").ok());
+  ASSERT_TRUE(Change(list, group, "oil").ok());
+  ASSERT_TRUE(manager_.Tick(list, 0, true, Person("bob")).ok());
+  const absl::StatusOr<AnnotationEdit> undone = manager_.Undo(Person("ann"));
+  ASSERT_TRUE(undone.ok()) << undone.status();
+  EXPECT_EQ(Get(note).text, "");
+  EXPECT_EQ(Get(list).text, "oil");
+  EXPECT_THAT(undone->description, HasSubstr("1 of 2"));
+  EXPECT_THAT(undone->description, HasSubstr("stays: check list " + list.substr(0, 8)));
+  group.edit_group = "gone";
+  ASSERT_TRUE(manager_.Delete(note, group).ok());
+  ASSERT_TRUE(manager_.Delete(list, group).ok());
+  ASSERT_TRUE(manager_.Undo(Person("ann")).ok());
+  EXPECT_THAT(*manager_.Latest(), SizeIs(2));
+}
+
 TEST_F(Marks, WhatIsMadeAndDeletedWithinAGroupLeavesNoStep) {
   Editor group = Person("ann");
   group.edit_group = "g";

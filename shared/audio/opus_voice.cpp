@@ -1,4 +1,4 @@
-#include "server/audio/opus_voice.hpp"
+#include "shared/audio/opus_voice.hpp"
 
 #include <absl/strings/str_cat.h>
 #include <opus.h>

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "server/audio/voice_frame.hpp"
+#include "shared/audio/voice_frame.hpp"
 
 struct OpusDecoder;
 struct OpusEncoder;

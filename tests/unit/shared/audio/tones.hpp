@@ -4,7 +4,7 @@
 #include <numbers>
 #include <span>
 
-#include "server/audio/voice_frame.hpp"
+#include "shared/audio/voice_frame.hpp"
 
 namespace saccade::testing {
 

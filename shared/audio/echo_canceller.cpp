@@ -1,4 +1,4 @@
-#include "server/audio/echo_canceller.hpp"
+#include "shared/audio/echo_canceller.hpp"
 
 #include <speex/speex_echo.h>
 #include <speex/speex_preprocess.h>

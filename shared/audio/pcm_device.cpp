@@ -1,4 +1,4 @@
-#include "server/audio/pcm_device.hpp"
+#include "shared/audio/pcm_device.hpp"
 
 #include <absl/strings/str_cat.h>
 #include <alsa/asoundlib.h>

@@ -1,9 +1,9 @@
-#include "server/audio/voice_mixer.hpp"
+#include "shared/audio/voice_mixer.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/unit/server/audio/tones.hpp"
+#include "tests/unit/shared/audio/tones.hpp"
 
 namespace saccade {
 namespace {
@@ -16,13 +16,8 @@ class Speaker {
  public:
   Speaker(std::string id, double frequency_hz)
       : id_(std::move(id)), tone_(frequency_hz, 6000.0), encoder_(*OpusVoiceEncoder::Create()) {}
-  v1::VoiceEvent Next() {
-    v1::VoiceEvent event;
-    event.set_participant_id(id_);
-    v1::VoicePacket& packet = *event.add_packets();
-    packet.set_sequence(++sequence_);
-    packet.set_opus(encoder_.Encode(tone_.Next()));
-    return event;
+  void Say(VoiceMixer& mixer, Timestamp now_ns) {
+    mixer.Hear(id_, {{++sequence_, now_ns, encoder_.Encode(tone_.Next())}}, now_ns);
   }
 
  private:
@@ -38,13 +33,15 @@ TEST(VoiceMixer, TwoAtOnceAreBothHeard) {
   VoiceFrame frame{};
   bool any = false;
   for (int i = 0; i < 50; ++i) {
-    mixer.Hear(low.Next(), i * kFrame);
-    mixer.Hear(high.Next(), i * kFrame);
+    low.Say(mixer, i * kFrame);
+    high.Say(mixer, i * kFrame);
     any = mixer.Mix(frame, i * kFrame);
   }
   EXPECT_TRUE(any);
   EXPECT_GT(AmplitudeOf(440.0, frame), 3000.0);
   EXPECT_GT(AmplitudeOf(1320.0, frame), 3000.0);
+  EXPECT_THAT(mixer.Speaking(50 * kFrame, 5 * kFrame), ::testing::UnorderedElementsAre("a", "b"));
+  EXPECT_THAT(mixer.Speaking(100 * kFrame, 5 * kFrame), ::testing::IsEmpty());
 }
 
 TEST(VoiceMixer, NobodyIsSilence) {
@@ -60,13 +57,8 @@ TEST(VoiceMixer, WhatIsNoOpusIsNotHeardAndDisturbsNobody) {
   Speaker good("good", 440.0);
   VoiceFrame frame{};
   for (int i = 0; i < 50; ++i) {
-    v1::VoiceEvent bad;
-    bad.set_participant_id("bad");
-    v1::VoicePacket& packet = *bad.add_packets();
-    packet.set_sequence(static_cast<std::uint64_t>(i));
-    packet.set_opus(std::string(300, '\xff'));
-    mixer.Hear(bad, i * kFrame);
-    mixer.Hear(good.Next(), i * kFrame);
+    mixer.Hear("bad", {{static_cast<std::uint64_t>(i), 0, std::string(300, '\xff')}}, i * kFrame);
+    good.Say(mixer, i * kFrame);
     mixer.Mix(frame, i * kFrame);
   }
   EXPECT_GT(AmplitudeOf(440.0, frame), 4000.0);
@@ -74,7 +66,7 @@ TEST(VoiceMixer, WhatIsNoOpusIsNotHeardAndDisturbsNobody) {
 
 TEST(VoiceMixer, ThoseWhoCannotAllBeHeardAreBounded) {
   VoiceMixer mixer;
-  for (int i = 0; i < 40; ++i) mixer.Hear(Speaker(std::to_string(i), 440.0).Next(), 0);
+  for (int i = 0; i < 40; ++i) Speaker(std::to_string(i), 440.0).Say(mixer, 0);
   VoiceFrame frame{};
   for (int i = 0; i < 10; ++i) mixer.Mix(frame, i * kFrame);
   // Those before are forgotten: there is room again.
@@ -83,7 +75,7 @@ TEST(VoiceMixer, ThoseWhoCannotAllBeHeardAreBounded) {
   for (int i = 0; i < 25; ++i) {
     const Timestamp now = 20'000'000'000 + i * kFrame;
     mixer.Mix(frame, now);
-    mixer.Hear(late.Next(), now);
+    late.Say(mixer, now);
     any = mixer.Mix(frame, now) || any;
   }
   EXPECT_TRUE(any);

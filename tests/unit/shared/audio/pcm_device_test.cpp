@@ -1,4 +1,4 @@
-#include "server/audio/pcm_device.hpp"
+#include "shared/audio/pcm_device.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
-#include "server/audio/opus_voice.hpp"
+#include "shared/audio/opus_voice.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/unit/server/audio/tones.hpp"
+#include "tests/unit/shared/audio/tones.hpp"
 
 namespace saccade {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/audio/jitter_buffer.hpp"
+#include "shared/audio/jitter_buffer.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -4,7 +4,7 @@
 #include <memory>
 #include <mutex>
 
-#include "server/audio/voice_frame.hpp"
+#include "shared/audio/voice_frame.hpp"
 
 struct SpeexEchoState_;
 struct SpeexPreprocessState_;

@@ -1,7 +1,8 @@
-#include "server/audio/voice_mixer.hpp"
+#include "shared/audio/voice_mixer.hpp"
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -9,22 +10,33 @@ namespace saccade {
 namespace {
 
 constexpr Timestamp kForgotten_ns = 10'000'000'000;
+constexpr double kHeardLevel = 0.008;
 
 }  // namespace
 
-void VoiceMixer::Hear(const v1::VoiceEvent& event, Timestamp now_ns) {
+void VoiceMixer::Hear(const std::string& speaker, const std::vector<VoicePacket>& packets,
+                      Timestamp now_ns) {
   const std::lock_guard lock(mutex_);
-  auto speaker = speakers_.find(event.participant_id());
-  if (speaker == speakers_.end()) {
+  auto known = speakers_.find(speaker);
+  if (known == speakers_.end()) {
     if (speakers_.size() >= kMaxSpeakers) return;
     absl::StatusOr<OpusVoiceDecoder> decoder = OpusVoiceDecoder::Create();
     if (!decoder.ok()) return;
-    speaker = speakers_.emplace(event.participant_id(), Speaker{*std::move(decoder), {}, 0}).first;
+    known = speakers_.emplace(speaker, Speaker{*std::move(decoder), {}}).first;
   }
-  speaker->second.heard_ns = now_ns;
-  for (const v1::VoicePacket& packet : event.packets()) {
-    speaker->second.buffer.Push(packet.sequence(), packet.opus(), now_ns);
+  known->second.heard_ns = now_ns;
+  for (const VoicePacket& packet : packets) {
+    known->second.buffer.Push(packet.sequence, packet.opus, now_ns);
   }
+}
+
+std::vector<std::string> VoiceMixer::Speaking(Timestamp now_ns, Timestamp within_ns) const {
+  std::vector<std::string> who;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [id, speaker] : speakers_) {
+    if (speaker.loud_ns != 0 && now_ns - speaker.loud_ns < within_ns) who.push_back(id);
+  }
+  return who;
 }
 
 bool VoiceMixer::Mix(VoiceFrame& frame, Timestamp now_ns) {
@@ -47,6 +59,7 @@ bool VoiceMixer::Mix(VoiceFrame& frame, Timestamp now_ns) {
         break;
     }
     any = true;
+    if (LoudnessOf(voice) > kHeardLevel) speaker.loud_ns = now_ns;
     for (std::size_t i = 0; i < kVoiceSamples; ++i) sum[i] += voice[i];
   }
   using Limits = std::numeric_limits<std::int16_t>;
@@ -55,6 +68,12 @@ bool VoiceMixer::Mix(VoiceFrame& frame, Timestamp now_ns) {
         std::clamp<std::int32_t>(sample, Limits::min(), Limits::max()));
   });
   return any;
+}
+
+double LoudnessOf(const VoiceFrame& frame) {
+  double sum = 0.0;
+  for (const std::int16_t sample : frame) sum += static_cast<double>(sample) * sample;
+  return std::sqrt(sum / kVoiceSamples) / 32768.0;
 }
 
 void VoiceMixer::Clear() {

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "server/audio/voice_frame.hpp"
+#include "shared/audio/voice_frame.hpp"
 
 struct _snd_pcm;
 

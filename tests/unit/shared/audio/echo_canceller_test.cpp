@@ -1,4 +1,4 @@
-#include "server/audio/echo_canceller.hpp"
+#include "shared/audio/echo_canceller.hpp"
 
 #include <gtest/gtest.h>
 
