@@ -170,12 +170,14 @@ void Engine::Track(Frame frame) {
   }
   const Timestamp captured_ns = clock_.ToMonotonic(frame.capture_time_ns, frame.received_time_ns);
   pictures_->Note(frame.id, captured_ns);  // before the ring has it, and with it anybody
+  wearable_->tracker().SetSight(scene_->sight());
   const WearableStep& step = wearable_->Step(std::move(frame));
   TrackedFrame next{.frame = step.frame, .tracked = {}};
   TrackedEvent& tracked = next.tracked;
   tracked.camera = step.frame->camera;
   tracked.stages.captured_ns = captured_ns;
   tracked.stages.received_ns = step.frame->received_time_ns;
+  scene_layer_.SetLight(wearable_->tracker().light());
   last_ = std::move(next);
   for (const AnchorMoved& moved : step.moved) {
     Log(absl::StrFormat("anchor %s moved %.1f mm: %s", moved.id, 1e3 * moved.delta_in_world.norm(),

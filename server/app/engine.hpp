@@ -84,6 +84,7 @@ class Engine : public Backend {
   void PausePicture(bool paused, std::string by, Done<PicturePause> done) override;
   std::shared_ptr<const PicturePause> picture_pause() const override;
   std::shared_ptr<const Scene> scene() const override;
+  SceneLight light() const override { return scene_layer_.light(); }
   absl::Status SubmitScene(SceneCommand command) override;
 
  private:

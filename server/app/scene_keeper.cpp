@@ -65,6 +65,16 @@ std::vector<PlacedMesh> PlacedMeshes(const Scene& scene, const AnnotationList& a
   return meshes;
 }
 
+std::shared_ptr<const Sight> SightOf(const Scene& scene) {
+  std::vector<TriangleMesh> meshes;
+  for (const SceneObject& object : scene.objects) {
+    if (object.material != SceneMaterial::kReal || object.parent != SceneParent::kWorld) continue;
+    Append(MeshOf(object, scene.Model(object.model).get()), object.parent_from_object, 1.0,
+           meshes.emplace_back());
+  }
+  return meshes.empty() ? nullptr : std::make_shared<const Sight>(meshes);
+}
+
 SceneKeeper::SceneKeeper(std::unique_ptr<SceneStore> store)
     : annotations_([] { return std::make_shared<const AnnotationList>(); }),
       store_(std::move(store)),
@@ -101,9 +111,16 @@ absl::Status SceneKeeper::Load() {
       scene.models.push_back(*std::move(read));
     }
   }
+  std::shared_ptr<const Sight> sight = SightOf(scene);
   const std::lock_guard lock(mutex_);
   scene_ = std::make_shared<const Scene>(std::move(scene));
+  sight_ = std::move(sight);
   return absl::OkStatus();
+}
+
+std::shared_ptr<const Sight> SceneKeeper::sight() const {
+  const std::lock_guard lock(mutex_);
+  return sight_;
 }
 
 std::shared_ptr<const Scene> SceneKeeper::scene() const {
@@ -113,7 +130,9 @@ std::shared_ptr<const Scene> SceneKeeper::scene() const {
 
 void SceneKeeper::Publish(Scene next) {
   next.revision = scene()->revision + 1;
+  std::shared_ptr<const Sight> sight = SightOf(next);
   const std::lock_guard lock(mutex_);
+  sight_ = std::move(sight);
   scene_ = std::make_shared<const Scene>(std::move(next));
 }
 

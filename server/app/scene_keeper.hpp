@@ -13,6 +13,7 @@
 #include "server/pipeline/events.hpp"
 #include "server/pipeline/runner.hpp"
 #include "server/pipeline/scene_commands.hpp"
+#include "server/scene/sight.hpp"
 #include "server/store/scene_store.hpp"
 #include "shared/render/scene_painter.hpp"
 #include "shared/scene/annotation.hpp"
@@ -39,6 +40,8 @@ class SceneKeeper {
 
   /// Never null.
   std::shared_ptr<const Scene> scene() const;
+  /// Of what is real and stands still; null: there is nothing.
+  std::shared_ptr<const Sight> sight() const;
   absl::Status Submit(SceneCommand command);
   /// What was not begun is answered Unavailable.
   void Stop();
@@ -60,11 +63,15 @@ class SceneKeeper {
   const std::unique_ptr<SceneStore> store_;  // null: none; the runner's thread
   mutable std::mutex mutex_;
   std::shared_ptr<const Scene> scene_ = std::make_shared<const Scene>();
+  std::shared_ptr<const Sight> sight_;
   std::mutex submit_mutex_;
   std::atomic<bool> stopping_ = false;  // set under submit_mutex_
   std::atomic<std::size_t> waiting_ = 0;
   Runner<SceneCommand> runner_;  // last: its thread uses all of the above
 };
+
+/// What is real and stands in the world, for what it hides; null: nothing.
+std::shared_ptr<const Sight> SightOf(const Scene& scene);
 
 /// Meshes of a scene where they are now. What is fixed to an annotation whose place is not known,
 /// or to a marker, is left out.

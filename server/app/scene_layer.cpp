@@ -20,6 +20,11 @@ bool SameLens(const CameraIntrinsics& a, const CameraIntrinsics& b) {
 
 }  // namespace
 
+void SceneLayer::SetLight(const SceneLight& light) {
+  const std::lock_guard lock(light_mutex_);
+  light_ = light;
+}
+
 cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
                          const CameraModel& camera, const Rigid3& world_from_camera) {
   const bool visible = std::any_of(
@@ -49,6 +54,7 @@ cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
     moves_ = std::any_of(scene.objects.begin(), scene.objects.end(),
                          [](const SceneObject& one) { return one.parent != SceneParent::kWorld; });
   }
+  view_->SetLight(light());
   absl::StatusOr<cv::Mat> drawn = view_->Draw(world_from_camera);
   if (!drawn.ok()) return give_up(drawn.status());
   return *std::move(drawn);

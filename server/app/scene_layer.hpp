@@ -19,6 +19,12 @@ class SceneLayer {
  public:
   explicit SceneLayer(GlBackend backend) : backend_(backend) {}
 
+  /// How light falls, as far as it is known.
+  void SetLight(const SceneLight& light);
+  SceneLight light() const {
+    const std::lock_guard lock(light_mutex_);
+    return light_;
+  }
   /// SceneView::Draw; empty where there is nothing to draw.
   cv::Mat Draw(const Scene& scene, const AnnotationList& annotations, const CameraModel& camera,
                const Rigid3& world_from_camera);
@@ -28,6 +34,9 @@ class SceneLayer {
   std::mutex mutex_;
   std::unique_ptr<SceneView> view_;
   CameraIntrinsics intrinsics_;  // of the view
+  mutable std::mutex
+      light_mutex_;  // not held while anything is drawn: the tracker waits for nobody
+  SceneLight light_;
   bool failed_ = false;
   std::uint64_t revision_ = 0;
   bool moves_ = false;  // something is fixed to an annotation: uploaded each time

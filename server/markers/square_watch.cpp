@@ -6,12 +6,21 @@
 #include "server/pipeline/stop_watch.hpp"
 
 namespace saccade {
+namespace {
+
+constexpr int kMirrorEvery = 4;  // pictures without a square
+
+}  // namespace
 
 void SquareWatch::Look(const cv::Mat& grey, Timestamp time_ns) {
   if (running_.valid()) return;
-  running_ = std::async(std::launch::async, [detector = detector_.get(), grey, time_ns] {
+  running_ = std::async(std::launch::async, [this, detector = detector_.get(), grey, time_ns] {
     const double begin_ms = ThreadCpuMs();
     Seen seen{time_ns, detector->Detect(grey), 0.0};
+    empty_ = seen.sightings.empty() ? empty_ + 1 : 0;
+    if (empty_ % kMirrorEvery == kMirrorEvery - 1) {
+      seen.mirrored = CountIfMirrored(*detector, grey);
+    }
     seen.detector_ms = ThreadCpuMs() - begin_ms;
     return seen;
   });

@@ -18,6 +18,8 @@ class SquareWatch {
     Timestamp time_ns = 0;  // of the picture
     std::vector<MarkerSighting> sightings;
     double detector_ms = 0;  // of its core
+    /// Of a picture without any, looked at now and then: how many its mirror image has.
+    std::optional<std::size_t> mirrored = std::nullopt;
   };
 
   explicit SquareWatch(std::unique_ptr<MarkerDetector> detector) : detector_(std::move(detector)) {}
@@ -42,6 +44,7 @@ class SquareWatch {
   std::unique_ptr<MarkerDetector> detector_;
   std::future<Seen> running_;
   double waited_ms_ = 0;
+  int empty_ = 0;  // pictures in a row; of the thread that looks
 };
 
 }  // namespace saccade

@@ -16,6 +16,7 @@
 #include "server/pipeline/gaze_commands.hpp"
 #include "server/pipeline/pointers.hpp"
 #include "server/pipeline/scene_commands.hpp"
+#include "shared/scene/scene_light.hpp"
 
 namespace saccade {
 
@@ -74,6 +75,8 @@ class Backend : public CommandPort {
   virtual std::shared_ptr<const PicturePause> picture_pause() const = 0;
   /// With every change that was answered; never null.
   virtual std::shared_ptr<const Scene> scene() const = 0;
+  /// How light falls, as far as it is known.
+  virtual SceneLight light() const { return {}; }
   /// To the scene's thread. On error `done` is not called: ResourceExhausted, Unavailable.
   virtual absl::Status SubmitScene(SceneCommand command) = 0;
 };

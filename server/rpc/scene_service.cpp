@@ -102,6 +102,7 @@ grpc::ServerUnaryReactor* SceneService::ListScene(Context* context,
   if (!session.ok()) return call.Finish(session.status());
   const std::shared_ptr<const Scene> scene = backend_.scene();
   response->set_revision(scene->revision);
+  *response->mutable_light() = wire::ToProto(backend_.light());
   if (request->known_revision() != scene->revision) {
     for (const SceneObject& object : scene->objects) {
       *response->add_objects() = wire::ToProto(object);

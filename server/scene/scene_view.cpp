@@ -97,6 +97,10 @@ absl::Status SceneView::SetMeshes(std::vector<PlacedMesh> meshes) {
       .get();
 }
 
+void SceneView::SetLight(const SceneLight& light) {
+  impl_->thread.Submit([this, light] { impl_->painter->SetLight(light); }).get();
+}
+
 absl::StatusOr<cv::Mat> SceneView::Draw(const Rigid3& world_from_camera) {
   return impl_->thread.Submit([this, world_from_camera] { return impl_->Draw(world_from_camera); })
       .get();

@@ -27,6 +27,8 @@ class SceneView {
 
   /// Replaces what is drawn.
   absl::Status SetMeshes(std::vector<PlacedMesh> meshes);
+  /// How what is virtual is lit, from the next Draw() on.
+  void SetLight(const SceneLight& light);
   /// What is virtual from there: CV_8UC4, B G R A premultiplied by alpha, of the camera's size;
   /// alpha 0 where nothing virtual is, or something real is before it.
   absl::StatusOr<cv::Mat> Draw(const Rigid3& world_from_camera);

@@ -217,4 +217,34 @@ std::vector<int> TriangleTree::Crossings(const Vector3d& point, const Vector3d& 
   return crossings;
 }
 
+std::optional<double> TriangleTree::FirstHit(const Vector3d& point, const Vector3d& direction,
+                                             double most_m) const {
+  if (triangles_.empty()) return std::nullopt;
+  Node from;
+  from.low = from.high = point.array();
+  Search search;
+  search.direction = direction;
+  search.best.distance_m = most_m;
+  bool hit = false;
+  std::vector<std::size_t> open = {0};
+  while (!open.empty()) {
+    const Node& node = nodes_[open.back()];
+    open.pop_back();
+    if (search.Entry(node, from) > search.best.distance_m) continue;
+    if (node.count == 0) {
+      open.push_back(node.first);
+      open.push_back(node.first + 1);
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      const auto touch = CornerOnFace(point, direction, triangles_[i].corners);
+      if (!touch || touch->distance_m > search.best.distance_m) continue;
+      search.best.distance_m = touch->distance_m;
+      hit = true;
+    }
+  }
+  if (!hit) return std::nullopt;
+  return search.best.distance_m;
+}
+
 }  // namespace saccade

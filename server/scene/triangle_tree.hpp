@@ -39,6 +39,11 @@ class TriangleTree {
   std::vector<int> Crossings(const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
                              std::size_t owners) const;
 
+  /// How far `point` is from what it meets first along `direction` (unit); nothing within `most_m`:
+  /// none.
+  std::optional<double> FirstHit(const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
+                                 double most_m) const;
+
  private:
   struct Node {
     Eigen::Array3d low, high;

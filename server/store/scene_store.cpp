@@ -49,6 +49,9 @@ absl::StatusOr<std::unique_ptr<SceneStore>> SceneStore::Open(
                           "PRAGMA synchronous = FULL", kSchema}) {
     if (absl::Status done = impl->database->Execute(sql); !done.ok()) return done;
   }
+  const absl::StatusOr<std::string> check = impl->database->Query("PRAGMA quick_check(1)");
+  if (!check.ok()) return check.status();
+  if (*check != "ok") return Damaged(impl->file, *check);
   return std::unique_ptr<SceneStore>(new SceneStore(std::move(impl)));
 }
 

@@ -25,7 +25,8 @@ class SceneStore {
     std::vector<StoredModel> models;
   };
 
-  /// Opens or creates the file in `directory`, which exists.
+  /// Opens or creates the file in `directory`, which exists. DataLoss: it is damaged, or none of
+  /// ours.
   static absl::StatusOr<std::unique_ptr<SceneStore>> Open(const std::filesystem::path& directory);
   ~SceneStore();
 

@@ -7,8 +7,10 @@
 #include <optional>
 
 #include "server/capture/frame.hpp"
+#include "server/scene/sight.hpp"
 #include "server/tracker/lens_state.hpp"
 #include "shared/scene/map_snapshot.hpp"
+#include "shared/scene/scene_light.hpp"
 
 namespace saccade {
 
@@ -26,6 +28,11 @@ class FrameTracker {
                                                 const Rigid3& world_from_camera,
                                                 const Eigen::Vector2d& pixel, double depth_prior_m,
                                                 double depth_sigma_m) = 0;
+  /// What stands still in the world, from the next frame on: landmarks behind it are not attempted.
+  /// Null: nothing is known of it.
+  virtual void SetSight(std::shared_ptr<const Sight> /*sight*/) {}
+  /// Where light comes from, by what the frames so far show of it.
+  virtual SceneLight light() const { return {}; }
   /// The lens of the frame tracked last, where it is learnt; null: that of the frames.
   virtual std::shared_ptr<const CameraModel> lens() const { return nullptr; }
   /// How far that is; nothing: it is not learnt.

@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "server/capture/gap.hpp"
+#include "server/markers/corner_look.hpp"
 #include "server/pipeline/stop_watch.hpp"
 #include "server/tracker/square_pose.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -19,6 +21,7 @@ constexpr double kFacing = 0.17;       // cosine: a square seen more aslant has 
 constexpr double kShortest_px = 14.0;  // side that is searched
 constexpr double kBorder_px = 4.0;
 constexpr double kCornerNoise_px = 0.05;  // beyond the fits: print and lens
+constexpr int kHiddenCorners = 3;         // behind known geometry: the square is not searched
 constexpr int kHiddenLines = 2;  // with no more sides than this something is before the square
 constexpr double kFirstPosition_m = 0.02, kFirstAngle_rad = 0.01;  // beyond what the detector says
 
@@ -47,7 +50,10 @@ absl::StatusOr<std::unique_ptr<LandmarkTracker>> LandmarkTracker::Create(
 LandmarkTracker::LandmarkTracker(const LandmarkOptions& options, SquareMap map,
                                  std::unique_ptr<MarkerDetector> detector)
     : options_(options), map_(std::move(map)), watch_(std::move(detector)) {
-  for (const KnownSquare& square : map_.squares) points_.push_back(square.CornersInWorld());
+  for (const KnownSquare& square : map_.squares) {
+    points_.push_back(square.CornersInWorld());
+    border_shares_.push_back(BorderShare(square.family));
+  }
   corners_.resize(4 * points_.size());
 }
 
@@ -94,7 +100,9 @@ std::shared_ptr<const MapSnapshot> LandmarkTracker::Track(const Frame& frame) {
   times_.predict_ms = watch.Lap_ms() - times_.waited_ms;
   if (started_) Measure(frame);
   Judge();
-  if (!started_ || squares_seen_ < kEnoughSquares) watch_.Look(frame.grey, frame.capture_time_ns);
+  if (!started_ || squares_seen_ < kEnoughSquares || doubts_.wants_pictures()) {
+    watch_.Look(frame.grey, frame.capture_time_ns);
+  }
   times_.total_ms = total.Lap_ms() - times_.waited_ms;
   return Publish(frame);
 }
@@ -104,12 +112,15 @@ bool LandmarkTracker::TakeDetection(const Frame& frame) {
   times_.waited_ms = watch_.waited_ms();
   if (!seen) return false;
   detector_ms_ = seen->detector_ms;
+  doubts_.Add(*frame.camera, seen->sightings, map_);
+  if (seen->mirrored) doubts_.AddMirrored(*seen->mirrored);
+  for (const std::string& words : doubts_.Take()) Log(absl::StrCat("landmarks: ", words));
   const double age_s = Seconds(frame.capture_time_ns - seen->time_ns);
   if (age_s < 0.0 || IsGap(seen->time_ns, frame.capture_time_ns)) return false;
-  const auto pose = PoseOfSquares(*frame.camera, seen->sightings, map_);
-  if (!pose) return false;
   // What carries on with one square is not thrown away for another's word.
   if (started_ && poor_in_row_ == 0) return false;
+  const auto pose = PoseOfSquares(*frame.camera, seen->sightings, map_);
+  if (!pose) return false;
   Matrix6d covariance = pose->fit.covariance;
   covariance.diagonal().head<3>().array() += kFirstPosition_m * kFirstPosition_m;
   covariance.diagonal().tail<3>().array() += kFirstAngle_rad * kFirstAngle_rad;
@@ -126,6 +137,9 @@ void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
       map_.squares[k].world_from_square.Inverse() * filter_.WorldFromCamera();
   const Eigen::Vector3d& at = square_from_camera.translation;
   if (at.z() < kFacing * at.norm()) return;  // from behind, or too much aslant
+  std::array<bool, 4> hidden{};
+  if (sight_) hidden = sight_->Hides(filter_.WorldFromCamera().translation, points_[k]);
+  if (std::ranges::count(hidden, true) >= kHiddenCorners) return;
   SquareGuess guess;
   std::array<PredictedPixel, 4> predicted;
   double longest = 0.0;
@@ -147,8 +161,10 @@ void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
   }
   // Something stands before it, which is no failure of the square's.
   if (search.lines <= kHiddenLines) return;
+  const CornerLook look = LookAtCorners(frame.grey, guess, search, border_shares_[k]);
   int agreeing = 0;
   for (int c = 0; c < 4; ++c) {
+    if (hidden[c] || !look.seen[c]) continue;
     Corner& corner = corners_[4 * k + c];
     corner.state = FeatureState::kFailed;
     if (!search.corners[c]) continue;
@@ -160,6 +176,10 @@ void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
     corner.noise = noise;
     corner.state = FeatureState::kMeasured;
     ++agreeing;
+  }
+  if (agreeing >= 3) {
+    papers_.push_back(
+        {map_.squares[k].world_from_square.rotation * Eigen::Vector3d::UnitZ(), look.paper});
   }
   // Of a square half covered the free corners count; a lone one is more likely something else's.
   if (agreeing == 1) {
@@ -173,7 +193,9 @@ void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
 
 void LandmarkTracker::Measure(const Frame& frame) {
   StopWatch watch;
+  papers_.clear();
   for (std::size_t k = 0; k < points_.size(); ++k) SearchOne(frame, k);
+  light_.Add(papers_);
   times_.search_ms = watch.Lap_ms();
   std::vector<KnownSight> seen;
   for (std::size_t k = 0; k < points_.size(); ++k) {

@@ -9,8 +9,10 @@
 #include "server/filter/landmark_filter.hpp"
 #include "server/markers/square_search.hpp"
 #include "server/markers/square_watch.hpp"
+#include "server/scene/light_fit.hpp"
 #include "server/tracker/frame_tracker.hpp"
 #include "server/tracker/landmark_options.hpp"
+#include "server/tracker/square_doubts.hpp"
 
 namespace saccade {
 
@@ -20,7 +22,8 @@ namespace saccade {
 /// Each frame: predict by M3, search the sides of every square in view, correct in information form
 /// with the corners found. Two squares carry it; with fewer it asks the detector, and begins anew
 /// where that sees enough. Each corner is a feature of the snapshot, 4 k + 1 to 4 k + 4 of square
-/// k; of a square that something hides no attempt is counted. One thread; the detector has its own.
+/// k; of a corner that something hides (known geometry, or a hand: where there is no black border
+/// on white paper) no attempt is counted. One thread; the detector has its own.
 class LandmarkTracker final : public FrameTracker {
  public:
   /// InvalidArgument, NotFound: no camera, options, the map of squares.
@@ -33,6 +36,9 @@ class LandmarkTracker final : public FrameTracker {
   /// FailedPrecondition: there are no features but squares.
   absl::StatusOr<FeatureId> SeedFeature(const Frame&, const Rigid3&, const Eigen::Vector2d&, double,
                                         double) override;
+
+  void SetSight(std::shared_ptr<const Sight> sight) override { sight_ = std::move(sight); }
+  SceneLight light() const override { return light_.light(); }
 
   /// What the detector took for the picture it answered for last [ms]; 0: it did not answer.
   double detector_ms() const { return detector_ms_; }
@@ -59,7 +65,12 @@ class LandmarkTracker final : public FrameTracker {
   const LandmarkOptions options_;
   const SquareMap map_;
   std::vector<std::array<Eigen::Vector3d, 4>> points_;  // of each square's corners, in world
+  std::vector<double> border_shares_;                   // of each
+  std::shared_ptr<const Sight> sight_;                  // null: nothing is known to be in the way
   SquareWatch watch_;
+  SquareDoubts doubts_;
+  LightFit light_;
+  std::vector<PaperSeen> papers_;  // of this frame
   LandmarkFilter filter_;
   std::vector<Corner> corners_;  // four a square
   bool started_ = false;

@@ -1,9 +1,13 @@
 #include "server/tracker/square_landmarks.hpp"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "server/markers/corner_look.hpp"
 #include "server/tracker/line_time.hpp"
+#include "shared/io/log.hpp"
 
 namespace saccade {
 namespace {
@@ -14,15 +18,12 @@ constexpr int kLookEvery = 5;            // frames, when nothing is missing
 constexpr double kFacing = 0.17;         // cosine; see LandmarkTracker
 constexpr double kShortest_px = 14.0;
 constexpr double kBorder_px = 4.0;
+constexpr int kHiddenCorners = 3;   // behind known geometry: the square is not searched
 constexpr int kHiddenLines = 2;     // with no more sides than this something is before the square
 constexpr double kSigma_px = 0.25;  // of a corner beyond its fits: lens, print, shutter
 constexpr double kLeastSpread_px = 1.0;  // of where a corner is expected
 constexpr double kMostSpread_px = 6.0;
 constexpr double kGate_sigmas = 4.0;
-constexpr double kMetreSigma = 0.02;  // relative, of what a metre is
-// A place is told to the filter loosely: it comes from the same pictures.
-constexpr double kPlaceShare = 0.1;  // of the distance
-constexpr double kPlaceAngle_rad = 0.2;
 
 }  // namespace
 
@@ -41,12 +42,17 @@ SquareLandmarks::SquareLandmarks(const LandmarkOptions& options, SquareMap known
                                  std::unique_ptr<MarkerDetector> detector)
     : options_(options), known_(std::move(known)), watch_(std::move(detector)) {
   known_states_.resize(4 * known_.squares.size());
+  for (const KnownSquare& square : known_.squares) {
+    known_shares_.push_back(BorderShare(square.family));
+  }
+  mapped_share_ = BorderShare(options_.family);
 }
 
 void SquareLandmarks::Reset() {
   watch_.Drop();
   newest_.clear();
   mapped_.clear();
+  misprinted_.clear();
   ForgetViews();
   ForgetSearch();
 }
@@ -72,13 +78,16 @@ void SquareLandmarks::Look(const Frame& frame, bool eager) {
   detector_ms_ = 0;
   const auto seen = watch_.Take(/*wait=*/!options_.live);
   waited_ms_ = watch_.waited_ms();
-  if (seen) Take(*seen);
+  if (seen) Take(*frame.camera, *seen);
   const bool wanting = eager || !views_.empty() || (mapped_.empty() && !options_.family.empty());
   if (frames_++ % kLookEvery == 0 || wanting) watch_.Look(frame.grey, frame.capture_time_ns);
 }
 
-void SquareLandmarks::Take(const SquareWatch::Seen& seen) {
+void SquareLandmarks::Take(const CameraModel& camera, const SquareWatch::Seen& seen) {
   detector_ms_ = seen.detector_ms;
+  doubts_.Add(camera, seen.sightings, known_);
+  if (seen.mirrored) doubts_.AddMirrored(*seen.mirrored);
+  for (const std::string& words : doubts_.Take()) Log(absl::StrCat("landmarks: ", words));
   newest_ = seen.sightings;
   for (const MarkerSighting& sighting : newest_) {
     const auto same = [&](const MarkerSighting& other) {
@@ -88,7 +97,8 @@ void SquareLandmarks::Take(const SquareWatch::Seen& seen) {
     // A square that is there twice has no place; one with guessed bits may be none.
     if (sighting.family != options_.family || !(options_.size_m > 0) ||
         known_.Find(sighting.family, sighting.id) != nullptr || mapped_.contains(key) ||
-        sighting.corrected_bits > 0 || std::ranges::count_if(newest_, same) != 1) {
+        misprinted_.contains(key) || sighting.corrected_bits > 0 ||
+        std::ranges::count_if(newest_, same) != 1) {
       continue;
     }
     std::vector<MarkerView>& views = views_[key];
@@ -111,14 +121,18 @@ std::optional<SquaresPose> SquareLandmarks::FindCamera(const CameraModel& camera
 }
 
 void SquareLandmarks::SearchOne(const Frame& frame, const Rigid3& pose, const Matrix6d& covariance,
-                                const CameraMotion& motion, double readout_s,
-                                const Rigid3& world_from_square,
-                                const std::array<Eigen::Vector3d, 4>& corners, CloneId marker,
+                                const CameraMotion& motion, double readout_s, const Sought& sought,
                                 std::array<FeatureState, 4>& states) {
   const CameraModel& camera = *frame.camera;
   states.fill(FeatureState::kNotAttempted);
+  const auto& [world_from_square, corners, border_share, marker] = sought;
   const Eigen::Vector3d at = (world_from_square.Inverse() * pose).translation;
   if (at.z() < kFacing * at.norm()) return;
+  std::array<Eigen::Vector3d, 4> in_world = corners;
+  for (Eigen::Vector3d& corner : in_world) corner = world_from_square * corner;
+  std::array<bool, 4> hidden{};
+  if (sight_) hidden = sight_->Hides(pose.translation, in_world);
+  if (std::ranges::count(hidden, true) >= kHiddenCorners) return;
   SquareGuess guess;
   std::array<Eigen::Vector2d, 4> d_readout;
   Eigen::Matrix<double, 6, 1> velocities;
@@ -140,8 +154,10 @@ void SquareLandmarks::SearchOne(const Frame& frame, const Rigid3& pose, const Ma
   if (longest < kShortest_px) return;
   const SquareSearch search = SearchSquareTwice(frame.grey, camera, guess);
   if (search.lines <= kHiddenLines) return;
+  const CornerLook look = LookAtCorners(frame.grey, guess, search, border_share);
   std::vector<Observation> own;
   for (int c = 0; c < 4; ++c) {
+    if (hidden[c] || !look.seen[c]) continue;
     ++attempted_;
     states[c] = FeatureState::kFailed;
     if (!search.corners[c]) continue;
@@ -164,6 +180,9 @@ void SquareLandmarks::SearchOne(const Frame& frame, const Rigid3& pose, const Ma
     }
     return;
   }
+  if (own.size() >= 3) {
+    papers_.push_back({world_from_square.rotation * Eigen::Vector3d::UnitZ(), look.paper});
+  }
   found_.insert(found_.end(), own.begin(), own.end());
 }
 
@@ -171,19 +190,24 @@ void SquareLandmarks::Search(const Frame& frame, const Rigid3& pose, const Matri
                              const CameraMotion& motion, bool with_known,
                              const FilterState& filter) {
   ForgetSearch();
+  papers_.clear();
   std::array<FeatureState, 4> states;
   for (std::size_t k = 0; with_known && k < known_.squares.size(); ++k) {
     const KnownSquare& square = known_.squares[k];
-    SearchOne(frame, pose, covariance, motion, filter.readout_s(), square.world_from_square,
-              SquareCorners(square.family, square.side_m), 0, states);
+    SearchOne(frame, pose, covariance, motion, filter.readout_s(),
+              {square.world_from_square, SquareCorners(square.family, square.side_m),
+               known_shares_[k], 0},
+              states);
     std::ranges::copy(states, known_states_.begin() + static_cast<std::ptrdiff_t>(4 * k));
   }
   for (const auto& [key, mapped] : mapped_) {
     const auto place = filter.ClonePose(mapped.marker);
     if (!place) continue;
-    SearchOne(frame, pose, covariance, motion, filter.readout_s(), *place,
-              SquareCorners(key.first, mapped.side_m), mapped.marker, states);
+    SearchOne(frame, pose, covariance, motion, filter.readout_s(),
+              {*place, SquareCorners(key.first, mapped.side_m), mapped_share_, mapped.marker},
+              states);
   }
+  light_.Add(papers_);
 }
 
 std::optional<Rigid3> SquareLandmarks::PoseByFound(const CameraModel& camera, const Rigid3& start,
@@ -229,41 +253,6 @@ std::vector<MarkerView> SquareLandmarks::PosedViews(const std::vector<MarkerView
     posed.back().world_from_camera = pose->second;
   }
   return posed;
-}
-
-std::optional<double> SquareLandmarks::FindMetre(const CameraModel& camera) const {
-  MarkerFitOptions options;
-  options.metric = false;
-  double information = 0.0, sum = 0.0;
-  for (const auto& [key, views] : views_) {
-    const auto fit = FitMarker(camera, PosedViews(views), options_.size_m, options);
-    if (!fit || !(fit->log_metre_sigma > 0.0)) continue;
-    const double weight = 1.0 / (fit->log_metre_sigma * fit->log_metre_sigma);
-    information += weight;
-    sum += weight * std::log(fit->metre);
-  }
-  if (!(information > 1.0 / (kMetreSigma * kMetreSigma))) return std::nullopt;
-  return std::exp(sum / information);
-}
-
-void SquareLandmarks::Place(const CameraModel& camera, int most, FilterState& filter) {
-  std::vector<Key> order;
-  for (const auto& [key, views] : views_) order.push_back(key);
-  std::ranges::rotate(order, std::ranges::upper_bound(order, last_tried_));
-  if (order.size() > static_cast<std::size_t>(most)) order.resize(static_cast<std::size_t>(most));
-  for (const Key& key : order) {
-    last_tried_ = key;
-    const auto fit =
-        FitMarker(camera, PosedViews(views_[key]), options_.size_m, MarkerFitOptions());
-    if (!fit) continue;
-    const double distance =
-        (fit->world_from_marker.translation - filter.camera().world_from_camera.translation).norm();
-    Matrix6d covariance = fit->covariance;
-    covariance.diagonal().head<3>().array() += std::pow(kPlaceShare * distance, 2);
-    covariance.diagonal().tail<3>().array() += kPlaceAngle_rad * kPlaceAngle_rad;
-    mapped_[key] = {filter.AddMarker(fit->world_from_marker, covariance), options_.size_m};
-    views_.erase(key);
-  }
 }
 
 std::optional<Rigid3> SquareLandmarks::PoseOf(const std::string& family, int id,

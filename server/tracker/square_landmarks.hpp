@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,8 +13,11 @@
 #include "server/filter/filter_state.hpp"
 #include "server/markers/square_search.hpp"
 #include "server/markers/square_watch.hpp"
+#include "server/scene/light_fit.hpp"
+#include "server/scene/sight.hpp"
 #include "server/tracker/landmark_options.hpp"
 #include "server/tracker/marker_fit.hpp"
+#include "server/tracker/square_doubts.hpp"
 #include "shared/scene/map_snapshot.hpp"
 
 namespace saccade {
@@ -29,6 +33,9 @@ class SquareLandmarks {
   /// Errors as LandmarkOptions::Validate, LoadSquares, MakeDetector.
   static absl::StatusOr<std::unique_ptr<SquareLandmarks>> Create(const LandmarkOptions& options);
 
+  /// See FrameTracker.
+  void SetSight(std::shared_ptr<const Sight> sight) { sight_ = std::move(sight); }
+  SceneLight light() const { return light_.light(); }
   /// The map was thrown away.
   void Reset();
   /// A frame begins: takes what the detector has seen, and gives it this picture. `eager`: every
@@ -62,7 +69,8 @@ class SquareLandmarks {
   /// Poses of earlier pictures, found elsewhere, in a map that begins.
   void RecordStart(const std::vector<std::pair<Timestamp, Rigid3>>& poses);
   /// What a metre is in the map, where the squares of unknown place tell it surely enough.
-  std::optional<double> FindMetre(const CameraModel& camera) const;
+  /// Squares that disagree with the others about it are told of, and not mapped.
+  std::optional<double> FindMetre(const CameraModel& camera);
   /// Puts squares into the filter whose place the views tell; the map must be metric.
   /// At most `most` squares are tried, in turn.
   void Place(const CameraModel& camera, int most, FilterState& filter);
@@ -86,18 +94,32 @@ class SquareLandmarks {
     double side_m = 0;
   };
 
+  /// A square to be searched for.
+  struct Sought {
+    Rigid3 world_from_square;
+    std::array<Eigen::Vector3d, 4> corners;  // in the square
+    double border_share;
+    CloneId marker = 0;  // in the filter; 0: its place is known
+  };
+
   SquareLandmarks(const LandmarkOptions& options, SquareMap known,
                   std::unique_ptr<MarkerDetector> detector);
-  void Take(const SquareWatch::Seen& seen);
+  void Take(const CameraModel& camera, const SquareWatch::Seen& seen);
+  /// Whether a square is as large as the map's metre has it; tells of one that is not.
+  bool HasItsSize(const CameraModel& camera, const Key& key);
   void SearchOne(const Frame& frame, const Rigid3& pose, const Matrix6d& covariance,
-                 const CameraMotion& motion, double readout_s, const Rigid3& world_from_square,
-                 const std::array<Eigen::Vector3d, 4>& corners, CloneId marker,
+                 const CameraMotion& motion, double readout_s, const Sought& sought,
                  std::array<FeatureState, 4>& states);
   std::vector<MarkerView> PosedViews(const std::vector<MarkerView>& views) const;
 
   const LandmarkOptions options_;
   const SquareMap known_;
+  std::shared_ptr<const Sight> sight_;  // null: nothing is known to be in the way
   SquareWatch watch_;
+  SquareDoubts doubts_;
+  std::set<Key> misprinted_;  // of another size than said: not mapped
+  LightFit light_;
+  std::vector<PaperSeen> papers_;                 // of this frame
   std::vector<MarkerSighting> newest_;            // of the newest answer, in this frame
   std::map<Key, std::vector<MarkerView>> views_;  // of squares without a place; poses by poses_
   std::map<Timestamp, Rigid3> poses_;             // world from camera
@@ -105,6 +127,8 @@ class SquareLandmarks {
   std::map<Key, Mapped> mapped_;
   std::vector<Observation> found_;
   std::vector<FeatureState> known_states_;
+  std::vector<double> known_shares_;  // BorderShare of each
+  double mapped_share_ = 0;           // of those that are mapped
   std::int64_t frames_ = 0;
   int attempted_ = 0;
   double waited_ms_ = 0, detector_ms_ = 0;

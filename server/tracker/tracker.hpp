@@ -59,6 +59,10 @@ class Tracker final : public FrameTracker {
   }
 
   /// What is known of it; nothing: the lens was given.
+  void SetSight(std::shared_ptr<const Sight> sight) override {
+    if (squares_) squares_->SetSight(std::move(sight));
+  }
+  SceneLight light() const override { return squares_ ? squares_->light() : SceneLight(); }
   std::optional<LensState> lens_state() const override {
     return learner_ ? std::optional(learner_->state()) : std::nullopt;
   }

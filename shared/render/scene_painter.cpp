@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "shared/render/contact_shadow.hpp"
+
 namespace saccade {
 namespace {
 
-constexpr std::array<int, 2> kSizes = {3, 4};
+constexpr std::array<int, 2> kSizes = {3, 4}, kShadowSizes = {3, 1};
 constexpr float kHiddenAlpha = 0.65f;
 
 constexpr const char* kVertex = R"(#version 330 core
@@ -30,14 +32,30 @@ void main() {
   gl_FragDepth = clamp(0.5 * (depth_row.x + depth_row.y / z) + 0.5, 0.0, 1.0);
   color = vec4(0.0);
 })";
+// A little of the light at the eye stays: it tells faces apart that the room lights alike.
 constexpr const char* kShadedFragment = R"(#version 330 core
 in vec3 point; flat in vec4 paint; out vec4 color;
-uniform float alpha;
+uniform float alpha; uniform vec3 toward; uniform float level; uniform float confidence;
 void main() {
   vec3 normal = normalize(cross(dFdx(point), dFdy(point)));
-  float light = 0.4 + 0.6 * abs(dot(normal, normalize(point)));
-  color = vec4(paint.rgb * light, 1.0) * alpha;
+  vec3 line = normalize(point);
+  if (dot(normal, line) > 0.0) normal = -normal;
+  float facing = abs(dot(normal, line));
+  float known = level * clamp(1.0 + dot(toward, normal), 0.25, 1.9) * (0.85 + 0.15 * facing);
+  float light = mix(0.4 + 0.6 * facing, known, confidence);
+  color = vec4(min(paint.rgb * light, vec3(1.0)), 1.0) * alpha;
 })";
+constexpr const char* kShadowVertex = R"(#version 330 core
+in vec3 position; in float darkness;
+uniform mat4 camera_from_world; uniform mat4 clip_from_camera;
+out float dark;
+void main() {
+  dark = darkness;
+  gl_Position = clip_from_camera * camera_from_world * vec4(position, 1.0);
+})";
+constexpr const char* kShadowFragment = R"(#version 330 core
+in float dark; out vec4 color;
+void main() { color = vec4(0.0, 0.0, 0.0, dark); })";
 
 struct Soup {
   std::vector<float> vertices;
@@ -70,7 +88,11 @@ Eigen::Matrix4f MatrixOf(const Rigid3& transform) {
 }  // namespace
 
 ScenePainter::ScenePainter(const GlFunctions& gl)
-    : gl_(gl), real_(gl, kSizes), drawn_(gl, kSizes), hidden_(gl, kSizes) {}
+    : gl_(gl),
+      real_(gl, kSizes),
+      drawn_(gl, kSizes),
+      hidden_(gl, kSizes),
+      shadows_(gl, kShadowSizes) {}
 
 absl::StatusOr<std::unique_ptr<ScenePainter>> ScenePainter::Create(const GlFunctions& gl) {
   std::unique_ptr<ScenePainter> made(new ScenePainter(gl));
@@ -79,6 +101,10 @@ absl::StatusOr<std::unique_ptr<ScenePainter>> ScenePainter::Create(const GlFunct
   if (!depth.ok()) return depth.status();
   auto shaded = Program::Create(gl, kVertex, kShadedFragment, kNames);
   if (!shaded.ok()) return shaded.status();
+  constexpr std::array<const char*, 2> kShadowNames = {"position", "darkness"};
+  auto shadow = Program::Create(gl, kShadowVertex, kShadowFragment, kShadowNames);
+  if (!shadow.ok()) return shadow.status();
+  made->shadow_ = *std::move(shadow);
   made->depth_ = *std::move(depth);
   made->shaded_ = *std::move(shaded);
   return made;
@@ -103,6 +129,17 @@ void ScenePainter::Upload(std::span<const PlacedMesh> meshes) {
   real_.Upload(real.vertices, real.indices);
   drawn_.Upload(drawn.vertices, drawn.indices);
   hidden_.Upload(hidden.vertices, hidden.indices);
+  const ShadowMesh shadows = ContactShadows(meshes);
+  std::vector<float> vertices;
+  for (std::size_t k = 0; k < shadows.positions.size(); ++k) {
+    const Eigen::Vector3f& p = shadows.positions[k];
+    vertices.insert(vertices.end(), {p.x(), p.y(), p.z(), shadows.darkness[k]});
+  }
+  std::vector<std::uint32_t> indices;
+  for (const auto& triangle : shadows.triangles) {
+    indices.insert(indices.end(), triangle.begin(), triangle.end());
+  }
+  shadows_.Upload(vertices, indices);
 }
 
 void ScenePainter::Draw(const Eigen::Matrix4f& clip_from_camera, const Rigid3& world_from_camera) {
@@ -128,8 +165,22 @@ void ScenePainter::Draw(const Eigen::Matrix4f& clip_from_camera, const Rigid3& w
   }
   use(*shaded_);
   shaded_->Set("alpha", 1.0f);
+  shaded_->Set("level", static_cast<float>(light_.level));
+  shaded_->Set("confidence", static_cast<float>(light_.confidence));
+  const Eigen::Vector3d toward = world_from_camera.rotation.conjugate() * light_.toward_in_world;
+  shaded_->Set("toward", Eigen::Vector3f(toward.cast<float>()));
   if (drawn_.index_count() > 0) drawn_.Draw();
+  if (shadows_.index_count() > 0) {
+    use(*shadow_);
+    gl_.DepthMask(GL_FALSE);
+    gl_.Enable(GL_BLEND);
+    gl_.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+    shadows_.Draw();
+    gl_.Disable(GL_BLEND);
+    gl_.DepthMask(GL_TRUE);
+  }
   if (hidden_.index_count() == 0) return;
+  use(*shaded_);
   gl_.Clear(GL_DEPTH_BUFFER_BIT);
   gl_.Enable(GL_BLEND);
   gl_.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);

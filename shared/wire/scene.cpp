@@ -48,6 +48,14 @@ v1::SceneObject ToProto(const SceneObject& object) {
   return message;
 }
 
+v1::SceneLight ToProto(const SceneLight& light) {
+  v1::SceneLight message;
+  message.set_level(light.level);
+  *message.mutable_toward_in_world() = ToProto(light.toward_in_world);
+  message.set_confidence(light.confidence);
+  return message;
+}
+
 v1::SceneModelFacts ToProto(const SceneModel& model) {
   v1::SceneModelFacts message;
   message.set_id(model.id);

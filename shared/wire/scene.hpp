@@ -4,6 +4,7 @@
 #include <absl/strings/string_view.h>
 
 #include "saccade/v1/scene.pb.h"
+#include "shared/scene/scene_light.hpp"
 #include "shared/scene/scene_object.hpp"
 
 /// Scene objects to and from messages, as to_proto.hpp and from_proto.hpp.
@@ -11,6 +12,7 @@ namespace saccade::wire {
 
 v1::SceneObject ToProto(const SceneObject& object);
 v1::SceneModelFacts ToProto(const SceneModel& model);
+v1::SceneLight ToProto(const SceneLight& light);
 
 /// Numbers are finite, enums known, ids UUIDs; sizes are the scene's to judge. `field` names the
 /// message in errors.

@@ -14,6 +14,7 @@
 #include "server/eval/run.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/statistics.hpp"
+#include "server/scene/shapes.hpp"
 #include "server/tracker/landmark_tracker.hpp"
 #include "server/tracker/square_pose.hpp"
 
@@ -34,6 +35,8 @@ struct LandmarksScenario {
 };
 constexpr LandmarksScenario kScenarios[] = {
     {"squares", HallMotion::kSquares, 20, "koller", 768, 576, 25},  // PAL
+    {"pillar", HallMotion::kPillar, 10, "koller", 768, 576, 25},
+    {"passer", HallMotion::kPasser, 10, "koller", 768, 576, 25},
     {"flip", HallMotion::kFlip, 120, "fused", 512, 384, 12.5},
     {"away", HallMotion::kAway, 26, "fused", 640, 480, 20},
 };
@@ -90,6 +93,12 @@ class HallWatch {
         ++covered_;
         covered_attempted_ += word[0] == 'n' ? 0 : 1;
       }
+      for (int c = 0; c < 4; ++c) {
+        if (!source_.Hidden(frame, k, c)) continue;
+        ++hidden_;
+        hidden_failed_ += first[c] == FeatureState::kFailed ? 1 : 0;
+        hidden_measured_ += first[c] == FeatureState::kMeasured ? 1 : 0;
+      }
       squares_.Write(absl::StrFormat("%d,%d,%d,%s\n", frame, source_.squares().squares[k].id,
                                      covered ? 1 : 0, word));
     }
@@ -103,12 +112,18 @@ class HallWatch {
     report["frame_ms"] = Percentiles(frame_ms_);
     report["detector_ms"] = Percentiles(detector_ms_);
     report["worst_error_m"] = worst_m_;
-    if (motion != HallMotion::kSquares) return;
+    if (motion == HallMotion::kFlip || motion == HallMotion::kAway) return;
+    report["covered_squares"] = covered_;  // square-frames
+    report["covered_attempted"] = covered_attempted_;
+    if (motion != HallMotion::kSquares) {  // corner-frames behind a thing
+      report["hidden_corners"] = hidden_;
+      report["hidden_failed"] = hidden_failed_;
+      report["hidden_measured"] = hidden_measured_;
+      return;
+    }
     report["half_covered_frames"] = half_;
     report["half_covered_tracked"] = half_tracked_;
     report["recovery_s"] = recovered_s_ ? Json(*recovered_s_) : Json(nullptr);
-    report["covered_squares"] = covered_;  // square-frames
-    report["covered_attempted"] = covered_attempted_;
   }
   absl::Status Close() { return squares_.Close(); }
 
@@ -119,6 +134,7 @@ class HallWatch {
   std::optional<double> recovered_s_;
   double worst_m_ = 0.0;
   int half_ = 0, half_tracked_ = 0, covered_ = 0, covered_attempted_ = 0;
+  int hidden_ = 0, hidden_failed_ = 0, hidden_measured_ = 0;
 };
 
 /// What IPPE makes of a detector's corners, frame by frame, and what the filter has beside it.
@@ -211,6 +227,16 @@ TrackerArguments ArgumentsFor(const LandmarksScenario& scenario, const TrackerAr
   return arguments;
 }
 
+/// What somebody has measured of the hall: its pillar.
+std::shared_ptr<const Sight> SightOfPillar(const SquaresSource& source) {
+  const Eigen::AlignedBox3d box = source.ThingAt(0);
+  TriangleMesh mesh;
+  Append(BoxMesh(box.sizes(), 0xffffffff),
+         {Eigen::Quaterniond::Identity(), {box.center().x(), box.max().y(), box.center().z()}}, 1.0,
+         mesh);
+  return std::make_shared<const Sight>(std::vector<TriangleMesh>{mesh});
+}
+
 absl::StatusOr<Json> RunOne(const LandmarksScenario& scenario, const SimArguments& arguments,
                             const std::filesystem::path& folder) {
   HallOptions hall;
@@ -234,6 +260,7 @@ absl::StatusOr<Json> RunOne(const LandmarksScenario& scenario, const SimArgument
   const TrackerArguments setup = ArgumentsFor(scenario, arguments.tracker, source, map);
   absl::StatusOr<std::unique_ptr<FrameTracker>> tracker = MakeFrameTracker(source.info(), setup);
   if (!tracker.ok()) return tracker.status();
+  if (scenario.motion == HallMotion::kPillar) (*tracker)->SetSight(SightOfPillar(source));
   absl::StatusOr<OutputFile> squares = OutputFile::Create(folder / "squares.csv");
   if (!squares.ok()) return squares.status();
   HallWatch watch(source, *std::move(squares));
@@ -278,7 +305,7 @@ absl::StatusOr<Json> RunOne(const LandmarksScenario& scenario, const SimArgument
 
 bool IsLandmarksScenario(absl::string_view name) { return Find(name) != nullptr; }
 
-std::string LandmarksScenarioNames() { return "squares, flip, away"; }
+std::string LandmarksScenarioNames() { return "squares, pillar, passer, flip, away"; }
 
 double LandmarksDuration_s(absl::string_view name) { return Find(name)->duration_s; }
 

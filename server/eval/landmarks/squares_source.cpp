@@ -113,7 +113,8 @@ absl::Status SquaresSource::HangSquares() {
 void SquaresSource::Paint() {
   std::mt19937_64 random(options_.seed + 77);
   const int tall = Texels(kFloorY - kTop), wide = Texels(kLength), deep = Texels(kFrontZ - kBackZ);
-  const double things = options_.motion == HallMotion::kSquares ? 3.0 : 22.0;
+  const bool bare = options_.motion != HallMotion::kFlip && options_.motion != HallMotion::kAway;
+  const double things = bare ? 3.0 : 22.0;
   const std::array<cv::Size, kWalls> sizes = {cv::Size(wide, tall), cv::Size(deep, tall),
                                               cv::Size(wide, tall), cv::Size(deep, tall),
                                               cv::Size(wide, deep), cv::Size(wide, deep)};
@@ -150,7 +151,20 @@ void SquaresSource::Paint() {
   }
 }
 
-double SquaresSource::Look(const Vector3d& o, const Vector3d& d) const {
+Eigen::AlignedBox3d SquaresSource::ThingAt(FrameId frame) const {
+  return ThingInHall(options_.motion, TimeOf(frame));
+}
+
+bool SquaresSource::Hidden(FrameId frame, std::size_t k, int c) const {
+  const Vector3d eye = WorldFromCamera(frame).translation;
+  const Vector3d way = map_.squares[k].CornersInWorld()[c] - eye;
+  const auto at = EntersBox(ThingAt(frame), eye, way);
+  return at && *at < 1.0;
+}
+
+double SquaresSource::Look(const Vector3d& o, const Vector3d& d,
+                           const Eigen::AlignedBox3d& thing) const {
+  if (const auto at = EntersBox(thing, o, d)) return LookOfThing(o + *at * d);
   double range = 1e9, cosine = 1.0;
   int wall = kFront;
   const auto offer = [&](int which, double direction, double distance) {
@@ -228,12 +242,18 @@ Rigid3 SquaresSource::PoseAt(double t) const {
 Rigid3 SquaresSource::WorldFromCamera(FrameId frame) const { return PoseAt(TimeOf(frame)); }
 
 bool SquaresSource::Covered(FrameId frame, std::size_t k) const {
+  if (!ThingAt(frame).isEmpty()) {
+    int hidden = 0;
+    for (int c = 0; c < 4; ++c) hidden += Hidden(frame, k, c) ? 1 : 0;
+    return hidden == 4;
+  }
   if (options_.motion != HallMotion::kSquares) return false;
   const double t = TimeOf(frame);
   return kAll.Holds(t) || (kHalf.Holds(t) && k % 2 == 0);
 }
 
 void SquaresSource::Cover(FrameId frame, cv::Mat& picture) const {
+  if (options_.motion != HallMotion::kSquares) return;
   const Rigid3 camera_from_world = WorldFromCamera(frame).Inverse();
   for (std::size_t k = 0; k < map_.squares.size(); ++k) {
     if (!Covered(frame, k)) continue;
@@ -255,13 +275,14 @@ cv::Mat SquaresSource::Draw(FrameId frame) const {
   const CameraIntrinsics& lens = info_.camera->intrinsics();
   const Rigid3 pose = WorldFromCamera(frame);
   const Eigen::Matrix3d turn = pose.RotationMatrix();
+  const Eigen::AlignedBox3d thing = ThingAt(frame);
   cv::Mat picture(lens.height, lens.width, CV_32F);
   for (int y = 0; y < lens.height; ++y) {
     float* row = picture.ptr<float>(y);
     const Vector3d down = turn.col(1) * ((y - lens.cy) / lens.fy) + turn.col(2);
     for (int x = 0; x < lens.width; ++x) {
       row[x] = static_cast<float>(
-          Look(pose.translation, down + turn.col(0) * ((x - lens.cx) / lens.fx)));
+          Look(pose.translation, down + turn.col(0) * ((x - lens.cx) / lens.fx), thing));
     }
   }
   Cover(frame, picture);

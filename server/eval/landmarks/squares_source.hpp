@@ -2,6 +2,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -10,16 +11,10 @@
 #include <vector>
 
 #include "server/capture/frame_source.hpp"
+#include "server/eval/landmarks/hall_thing.hpp"
 #include "server/markers/square_map.hpp"
 
 namespace saccade {
-
-/// What happens in the hall.
-enum class HallMotion {
-  kSquares,  // before eight squares on two walls; half of them covered, then all
-  kFlip,     // one small square, seen 5 to 20 degrees from frontal
-  kAway,     // from the squares into the part of the hall that has none, and back
-};
 
 struct HallOptions {
   std::uint64_t seed = 1;
@@ -44,8 +39,12 @@ class SquaresSource final : public FrameSource {
   // Truth.
   Rigid3 WorldFromCamera(FrameId frame) const;
   const SquareMap& squares() const { return map_; }
-  /// Whether something is held before square `k` of the map.
+  /// Whether something is held before square `k` of the map, or stands before all of it.
   bool Covered(FrameId frame, std::size_t k) const;
+  /// Whether something is between the camera and corner `c` of square `k`.
+  bool Hidden(FrameId frame, std::size_t k, int c) const;
+  /// What stands in the hall, or walks there, in this frame.
+  Eigen::AlignedBox3d ThingAt(FrameId frame) const;
   /// When half of the squares, and all of them, are covered: [from, until) in seconds.
   struct Span {
     double from_s, until_s;
@@ -60,7 +59,8 @@ class SquaresSource final : public FrameSource {
   void Paint();
   double TimeOf(FrameId frame) const { return static_cast<double>(frame) / options_.fps; }
   Rigid3 PoseAt(double time_s) const;
-  double Look(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+  double Look(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+              const Eigen::AlignedBox3d& thing) const;
   cv::Mat Draw(FrameId frame) const;
   void Cover(FrameId frame, cv::Mat& picture) const;
 

@@ -79,6 +79,8 @@ TEST_F(SceneCalls, AThingIsPushedToTheWallAndStandsOnTheFloor) {
   EXPECT_EQ(placed.stop().object_name(), "room");
   EXPECT_NEAR(placed.support().normal_in_world().y(), -1, 1e-6);
   EXPECT_EQ(List().objects_size(), 2);
+  ASSERT_TRUE(List().has_light());
+  EXPECT_EQ(List().light().confidence(), 0.0);  // no square tells where it comes from
 
   // Moved again by its id: itself is nothing in its way.
   *request.mutable_object() = placed.object();

@@ -7,6 +7,7 @@
 #include "server/eval/landmarks/squares_source.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/score.hpp"
+#include "server/scene/shapes.hpp"
 #include "server/tracker/landmark_tracker.hpp"
 #include "server/tracker/make_tracker.hpp"
 
@@ -97,6 +98,104 @@ TEST_F(HallOfSquares, KollersTrackerRefusesWhatItCannotUse) {
   std::ofstream(file_) << one.ToToml();
   EXPECT_EQ(LandmarkTracker::Create(source_->info(), Koller()).status().code(),
             absl::StatusCode::kInvalidArgument);
+}
+
+/// What became of the corners behind the thing in the hall, over some seconds.
+struct Behind {
+  int hidden = 0, failed = 0, measured = 0;  // corner-frames
+  int squares = 0, attempted = 0;            // square-frames, wholly hidden
+  int frames = 0, tracked = 0;
+  double worst_m = 0.0;
+};
+
+/// `mode` koller or fused; `told`: the tracker knows the thing's shape.
+Behind FollowBehind(HallMotion motion, const std::string& mode, bool told, double duration_s) {
+  HallOptions options;
+  options.motion = motion;
+  options.width = 640;
+  options.height = 480;
+  options.fps = 12.5;
+  options.duration_s = duration_s;
+  auto source = SquaresSource::Create(options);
+  EXPECT_TRUE(source.ok());
+  LandmarkOptions landmarks;
+  landmarks.mode = mode;
+  landmarks.file = std::filesystem::path(testing::TempDir()) /
+                   ("landmarks_behind_" + std::to_string(getpid()) + ".toml");
+  std::ofstream(landmarks.file) << (*source)->squares().ToToml();
+  auto tracker = MakeFrameTracker((*source)->info(), TrackerOptions(), landmarks);
+  EXPECT_TRUE(tracker.ok()) << tracker.status();
+  if (told) {
+    const Eigen::AlignedBox3d box = (*source)->ThingAt(0);
+    TriangleMesh mesh;
+    Append(BoxMesh(box.sizes(), 0xffffffff),
+           {Eigen::Quaterniond::Identity(), {box.center().x(), box.max().y(), box.center().z()}},
+           1.0, mesh);
+    (*tracker)->SetSight(std::make_shared<const Sight>(std::vector<TriangleMesh>{mesh}));
+  }
+  Behind behind;
+  while (tracker.ok()) {
+    const auto frame = (*source)->Next();
+    if (!frame.ok() || !*frame) break;
+    const FrameId id = (*frame)->id;
+    const auto snapshot = (*tracker)->Track(**frame);
+    ++behind.frames;
+    if (VerdictOf(*snapshot) == FrameVerdict::kTracked) {
+      ++behind.tracked;
+      behind.worst_m = std::max(behind.worst_m, (snapshot->world_from_camera.translation -
+                                                 (*source)->WorldFromCamera(id).translation)
+                                                    .norm());
+    }
+    std::vector<FeatureState> corners;
+    for (const FeatureSnapshot& feature : snapshot->features) corners.push_back(feature.state);
+    if (const auto* fused = dynamic_cast<const Tracker*>(tracker->get())) {
+      corners = fused->squares()->StatesOfKnown();
+    }
+    for (std::size_t k = 0; k < (*source)->squares().squares.size(); ++k) {
+      int tried = 0;
+      for (int c = 0; c < 4; ++c) {
+        const FeatureState state = corners[4 * k + c];
+        tried += state != FeatureState::kNotAttempted ? 1 : 0;
+        if (!(*source)->Hidden(id, k, c)) continue;
+        ++behind.hidden;
+        behind.failed += state == FeatureState::kFailed ? 1 : 0;
+        behind.measured += state == FeatureState::kMeasured ? 1 : 0;
+      }
+      if (!(*source)->Covered(id, k)) continue;
+      ++behind.squares;
+      behind.attempted += tried > 0 ? 1 : 0;
+    }
+  }
+  std::cout << "hidden corners " << behind.hidden << ", failed " << behind.failed << ", measured "
+            << behind.measured << "; hidden squares " << behind.squares << ", attempted "
+            << behind.attempted << "; tracked " << behind.tracked << " of " << behind.frames
+            << ", worst " << 1e3 * behind.worst_m << " mm\n";
+  return behind;
+}
+
+TEST(KnownGeometry, ASquareBehindAPillarCountsNoAttemptInEitherTracker) {
+  for (const char* mode : {"koller", "fused"}) {
+    SCOPED_TRACE(mode);
+    const Behind behind = FollowBehind(HallMotion::kPillar, mode, /*told=*/true, 3.0);
+    EXPECT_GT(behind.squares, 20);
+    EXPECT_EQ(behind.attempted, 0);
+    EXPECT_LE(behind.failed + behind.measured, behind.hidden / 50);  // at its edge, by a pixel
+    EXPECT_GT(behind.tracked, 0.5 * behind.frames);
+    EXPECT_LT(behind.worst_m, 0.05);
+  }
+}
+
+TEST(MovingThings, WhatAPasserByHidesIsNotMeasuredThoughNobodyToldOfHim) {
+  for (const char* mode : {"koller", "fused"}) {
+    SCOPED_TRACE(mode);
+    const Behind behind = FollowBehind(HallMotion::kPasser, mode, /*told=*/false, 5.0);
+    EXPECT_GT(behind.squares, 20);
+    // A corner just behind his edge is where its sides meet, which are seen for the most part.
+    EXPECT_LE(behind.measured, behind.hidden / 5);
+    EXPECT_LE(behind.failed, behind.hidden / 10);
+    EXPECT_GT(behind.tracked, 0.5 * behind.frames);
+    EXPECT_LT(behind.worst_m, 0.05);
+  }
 }
 
 /// A fused tracker in the textured hall; what it published as tracked, beside the truth.

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <opencv2/imgproc.hpp>
 
+#include "server/markers/corner_look.hpp"
 #include "server/markers/square_map.hpp"
 #include "server/markers/square_search.hpp"
 #include "server/markers/square_watch.hpp"
@@ -100,6 +101,56 @@ TEST(SquareSearch, KeepsTheCornersThatAHandLeavesFree) {
   if (search.corners[0]) {
     EXPECT_LT((search.corners[0]->pixel - seen.corners[0]).norm(), 1.0);
   }
+}
+
+/// Corners that the search finds and that look like corners.
+std::array<bool, 4> InView(const cv::Mat& picture, const Seen& seen) {
+  const SquareGuess guess = Off(seen, {1, 1}, 1);
+  const SquareSearch search = SearchSquareTwice(picture, Camera(), guess);
+  return LookAtCorners(picture, guess, search, BorderShare("apriltag36h11")).seen;
+}
+
+TEST(CornerLook, TellsASquaresCornerFromWhatIsHeldBeforeIt) {
+  int seen_free = 0, seen_behind = 0, behind = 0;
+  for (int k = 0; k < 5; ++k) {
+    const Seen seen = Render(0.55 + 0.14 * k, 0.16 * (k - 2), 0.4 * k, 20 + k);
+    for (const bool one : InView(seen.picture, seen)) seen_free += one ? 1 : 0;
+    // A checked sleeve over two of them, as bright and as dark as the square.
+    cv::Mat picture = seen.picture.clone();
+    const Eigen::Vector2d a = seen.corners[0];
+    const Eigen::Vector2d across = 0.45 * (seen.corners[3] - seen.corners[0]);
+    for (int y = 0; y < picture.rows; ++y) {
+      for (int x = 0; x < picture.cols; ++x) {
+        const Eigen::Vector2d off = Eigen::Vector2d(x, y) - a;
+        if (off.dot(across) > across.squaredNorm()) continue;
+        const bool bright = (x / 9 + y / 7 + k) % 2 == 0;
+        picture.at<std::uint8_t>(y, x) = bright ? 215 : 35;
+      }
+    }
+    cv::GaussianBlur(picture, picture, {}, 0.7);
+    const std::array<bool, 4> left = InView(picture, seen);
+    behind += 2;
+    seen_behind += (left[0] ? 1 : 0) + (left[1] ? 1 : 0);
+  }
+  EXPECT_EQ(seen_free, 20);
+  EXPECT_LE(seen_behind, 1) << "of " << behind;
+}
+
+TEST(SquareWatch, AMirroredPictureIsFoundOut) {
+  MarkerOptions options;
+  options.families = {"apriltag36h11"};
+  SquareWatch watch(*MakeMarkerDetector("apriltag", options));
+  cv::Mat mirrored;
+  cv::flip(Render(0.7, 0.1, 0.1, 5).picture, mirrored, 1);
+  std::size_t found = 0;
+  for (int k = 0; k < 8; ++k) {
+    watch.Look(mirrored, k);
+    const auto seen = watch.Take(true);
+    ASSERT_TRUE(seen);
+    EXPECT_TRUE(seen->sightings.empty());
+    found += seen->mirrored.value_or(0);
+  }
+  EXPECT_EQ(found, 2u);  // every fourth picture is looked at so
 }
 
 TEST(SquareSearch, OfPicturesEdgeAndTinySquaresHasNothingToSay) {

@@ -1,9 +1,12 @@
 #include "server/store/scene_store.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
 namespace saccade {
 namespace {
@@ -12,7 +15,7 @@ class SceneStoreTest : public testing::Test {
  protected:
   void SetUp() override {
     folder_ = std::filesystem::path(testing::TempDir()) /
-              ("scene_store_test-" + std::to_string(::getpid()));
+              ("scene_store_test_" + std::to_string(getpid()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
@@ -61,6 +64,84 @@ TEST_F(SceneStoreTest, WhatIsPutIsFoundAtTheNextStart) {
     ASSERT_TRUE(store->RemoveObject("a").ok());
   }
   EXPECT_EQ(Open()->LoadAll()->objects.size(), 1u);
+}
+
+SceneObject Box(int number) {
+  SceneObject box;
+  box.id = "id-" + std::to_string(number);
+  box.name = std::string(90, 'x');
+  return box;
+}
+
+/// Fills it until it refuses; what it accepted is there, then and after the next start.
+void FillUntilRefused(const std::filesystem::path& folder) {
+  std::size_t objects = 0, models = 0;
+  {
+    const auto store = SceneStore::Open(folder);
+    ASSERT_TRUE(store.ok()) << store.status();
+    absl::Status refused;
+    for (int k = 0; k < 2000 && refused.ok(); ++k) {
+      refused = (*store)->PutObject(Box(k));
+      objects += refused.ok() ? 1 : 0;
+      if (!refused.ok()) break;
+      refused = (*store)->PutModel({"m" + std::to_string(k), "part", std::string(20'000, 'g')});
+      models += refused.ok() ? 1 : 0;
+    }
+    EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted) << refused;
+    EXPECT_THAT(std::string(refused.message()), testing::HasSubstr("scene.sqlite"));
+    EXPECT_THAT(std::string(refused.message()), testing::HasSubstr("make room"));
+    const auto stored = (*store)->LoadAll();
+    ASSERT_TRUE(stored.ok()) << stored.status();
+    EXPECT_EQ(stored->objects.size(), objects);
+    EXPECT_EQ(stored->models.size(), models);
+  }
+  EXPECT_GT(models, 2u);
+  const auto again = SceneStore::Open(folder);
+  if (!again.ok()) {  // not even its index fits: in words
+    EXPECT_EQ(again.status().code(), absl::StatusCode::kResourceExhausted) << again.status();
+    return;
+  }
+  const auto stored = (*again)->LoadAll();
+  ASSERT_TRUE(stored.ok()) << stored.status();
+  EXPECT_EQ(stored->objects.size(), objects);
+  EXPECT_EQ(stored->models.size(), models);
+}
+
+TEST_F(SceneStoreTest, AFullDiskIsNamedAndLosesNothingAccepted) {
+  if (geteuid() != 0 || mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=512k") != 0) {
+    GTEST_SKIP() << "needs the right to mount a tmpfs";
+  }
+  FillUntilRefused(folder_);
+  umount(folder_.c_str());
+}
+
+TEST_F(SceneStoreTest, TornOrForeignFilesAreRefusedInWords) {
+  {
+    const auto store = Open();
+    for (int k = 0; k < 300; ++k) ASSERT_TRUE(store->PutObject(Box(k)).ok());
+  }
+  const std::filesystem::path file = folder_ / "scene.sqlite";
+  const auto size = std::filesystem::file_size(file);
+  std::filesystem::copy_file(file, folder_ / "whole");
+  const auto refused = [&](const char* what) {
+    const auto opened = SceneStore::Open(folder_);
+    const absl::Status status = opened.ok() ? (*opened)->LoadAll().status() : opened.status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << what << ": " << status;
+    EXPECT_THAT(std::string(status.message()), testing::HasSubstr("scene.sqlite")) << what;
+    EXPECT_THAT(std::string(status.message()), testing::HasSubstr("move")) << what;
+    std::filesystem::copy_file(folder_ / "whole", file,
+                               std::filesystem::copy_options::overwrite_existing);
+  };
+  std::filesystem::resize_file(file, size / 2);
+  refused("torn");
+  {
+    std::fstream raw(file, std::ios::in | std::ios::out | std::ios::binary);
+    for (int page = 1; page < 6; ++page) raw.seekp(4096 * page) << std::string(4096, '\xee');
+  }
+  refused("damaged inside");
+  std::ofstream(file) << std::string(8192, 'x');
+  refused("no database");
+  EXPECT_EQ(Open()->LoadAll()->objects.size(), 300u);  // the whole one, put back
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "server/tracker/landmark_options.hpp"
 #include "server/tracker/marker_fit.hpp"
+#include "server/tracker/square_doubts.hpp"
 
 namespace saccade {
 namespace {
@@ -122,6 +123,72 @@ TEST(PoseOfSquares, LeavesOutASquareThatHasMoved) {
   EXPECT_LT(pose->fit.world_from_camera.translation.norm(), 0.1);  // flat, near frontal
   // One square near frontal does not tell.
   EXPECT_FALSE(PoseOfSquares(Camera(), {seen[2]}, SquareMap()));
+}
+
+/// Five squares on two walls, seen from several places; square 2 is printed at `factor`.
+std::vector<std::string> WordsAbout(double factor, bool twice) {
+  std::mt19937_64 random(4);
+  SquareMap map;
+  for (int k = 0; k < 5; ++k) {
+    Rigid3 pose = Square();
+    pose.translation += Eigen::Vector3d(0.22 * k - 0.4, 0.12 * (k % 3) - 0.1, 0.05 * k);
+    if (k > 2) pose.rotation = ExpQuaternion(Eigen::Vector3d(0, -0.7, 0)) * pose.rotation;
+    map.squares.push_back({"apriltag36h11", k, kSide_m, pose});
+  }
+  SquareDoubts doubts;
+  std::vector<std::string> words;
+  for (int picture = 0; picture < 10; ++picture) {
+    const Rigid3 camera(ExpQuaternion(Eigen::Vector3d(0.01 * picture, 0.02 * picture, 0)),
+                        {0.03 * picture - 0.1, 0.05, 0.02 * picture});
+    std::vector<MarkerSighting> seen;
+    for (const KnownSquare& square : map.squares) {
+      const double side = square.id == 2 ? factor * kSide_m : kSide_m;
+      seen.push_back(View(camera, square.world_from_square, side, random).sighting);
+      seen.back().id = square.id;
+    }
+    if (twice) {
+      MarkerSighting twin = seen[1];
+      for (Eigen::Vector2d& corner : twin.corners) corner += Eigen::Vector2d(150, 40);
+      seen.push_back(twin);
+      EXPECT_TRUE(PoseOfSquares(Camera(), seen, map));  // by the others
+      EXPECT_FALSE(PoseOfSquares(Camera(), {seen[1], twin}, map));
+    }
+    doubts.Add(Camera(), seen, map);
+    for (std::string& one : doubts.Take()) words.push_back(std::move(one));
+  }
+  return words;
+}
+
+TEST(SquareDoubts, ASquareOfAnotherSizeThanSaidIsNamedWithItsSize) {
+  EXPECT_THAT(WordsAbout(1.0, false), ::testing::IsEmpty());
+  for (const double factor : {1.25, 0.8}) {
+    const std::vector<std::string> words = WordsAbout(factor, false);
+    ASSERT_EQ(words.size(), 1u);
+    EXPECT_THAT(words[0], HasSubstr("apriltag36h11 2 "));
+    const std::string before = "by the others it is ";
+    ASSERT_THAT(words[0], HasSubstr(before));
+    EXPECT_NEAR(std::stod(words[0].substr(words[0].find(before) + before.size())), factor, 0.021);
+    EXPECT_THAT(words[0], HasSubstr("instead of 80.0 mm"));
+  }
+}
+
+TEST(SquareDoubts, OneThatIsThereTwiceIsNotUsedAndNamed) {
+  const std::vector<std::string> words = WordsAbout(1.0, true);
+  ASSERT_EQ(words.size(), 1u);
+  EXPECT_THAT(words[0], HasSubstr("apriltag36h11 1 is in the picture twice"));
+}
+
+TEST(SquareDoubts, AMirroredPictureIsNamedOnceAfterSomePictures) {
+  SquareDoubts doubts;
+  doubts.AddMirrored(2);
+  doubts.AddMirrored(0);  // it was noise
+  doubts.AddMirrored(2);
+  doubts.AddMirrored(2);
+  EXPECT_THAT(doubts.Take(), ::testing::IsEmpty());
+  doubts.AddMirrored(2);
+  EXPECT_THAT(doubts.Take(), ::testing::ElementsAre(HasSubstr("the picture is mirrored: 2")));
+  doubts.AddMirrored(2);
+  EXPECT_THAT(doubts.Take(), ::testing::IsEmpty());
 }
 
 TEST(LandmarkOptions, AreReadAndRefused) {
