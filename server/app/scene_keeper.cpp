@@ -113,8 +113,12 @@ std::shared_ptr<const Scene> SceneKeeper::scene() const {
 
 void SceneKeeper::Publish(Scene next) {
   next.revision = scene()->revision + 1;
-  const std::lock_guard lock(mutex_);
-  scene_ = std::make_shared<const Scene>(std::move(next));
+  const auto published = std::make_shared<const Scene>(std::move(next));
+  {
+    const std::lock_guard lock(mutex_);
+    scene_ = published;
+  }
+  on_change_(published);
 }
 
 absl::Status SceneKeeper::Submit(SceneCommand command) {
