@@ -148,6 +148,7 @@ export class MapView {
     const q = threeOrientation(pose);
     this.eye.position.set(p.x, p.y, p.z);
     this.eye.quaternion.set(q.x, q.y, q.z, q.w);
+    this.eye.updateMatrixWorld(); // it belongs to the second scene
     this.renderer.clear();
     this.renderer.render(this.scene, this.eye);
     // After the map, of which known surfaces hide nothing.

@@ -106,6 +106,7 @@ export async function pointsOf(file: Uint8Array): Promise<Vec3[]> {
 
 /** Turns of an edge that are drawn [deg]. */
 const EDGE_DEG = 20;
+const MOST_WITH_EDGES = 60_000; // vertices: edges are found by all of them
 
 function edgesOf(geometry: THREE.BufferGeometry): THREE.LineSegments {
   const material = new THREE.LineBasicMaterial({ color: EDGE_COLOUR });
@@ -133,7 +134,8 @@ export async function meshesOf(
     mesh.renderOrder = ORDER[thing.material];
     mesh.frustumCulled = false;
     group.add(mesh);
-    if (outside && thing.material === 'real') group.add(edgesOf(geometry));
+    const few = geometry.getAttribute('position').count <= MOST_WITH_EDGES;
+    if (outside && few && thing.material === 'real') group.add(edgesOf(geometry));
   }
   return group;
 }

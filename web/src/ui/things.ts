@@ -90,8 +90,8 @@ export class Things {
   }
 
   cancel(): void {
-    this.measure.cancel();
     if (!this.begun) return;
+    this.measure.cancel();
     this.register.cancel();
     this.clickDoes = 'select';
     this.say(this.hint(), false);
@@ -135,7 +135,9 @@ export class Things {
     }
     this.run(pane, async () => {
       const model = await this.modelOf(clickDoes);
-      return this.placeAt(pane, spot, this.draftOf(model), model.sizeM);
+      const words = await this.placeAt(pane, spot, this.draftOf(model), model.sizeM);
+      this.clickDoes = 'select'; // one click, one thing
+      return words;
     });
   }
 
@@ -185,7 +187,6 @@ export class Things {
 
   private placed({ thing, stop, support }: Placed): string {
     this.state.thingId = thing.id;
-    if (this.clickDoes !== 'move') this.clickDoes = 'select'; // one click, one thing
     const moved = stop ? `touches ${stop.name} after ${stop.movedM.toFixed(3)} m, ` : '';
     return `${thing.name} ${moved}rests on ${support.name}`;
   }
@@ -263,7 +264,7 @@ export class Things {
     const thing = this.selected;
     if (!thing) return this.say(`Not ${done}: select a thing first.`, true);
     if (thing.material === 'real') {
-      return this.say(`Not ${done}: ${thing.name} is real; it moves only where it stands.`, true);
+      return this.say(`Not ${done}: ${thing.name} is real: it stays where it is.`, true);
     }
     this.run('map', async () => this.placed(await act(thing)), `Not ${done}: `);
   }

@@ -169,7 +169,6 @@ export class ThingsPanel {
 
   private updatePlace(): void {
     const thing = this.things.selected;
-    setClass(this.moves, 'hidden', false);
     if (!thing) return setText(this.place, 'Select a thing to read its place.');
     const { x, y, z } = thing.parentFromObject.translation;
     const unit = this.session.scale.metric ? 'm' : 'units of the map';
