@@ -74,6 +74,10 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, Event
       [this](const TrackedFrame& frame) { return DrawAugmented(frame, /*waits=*/false); }, may_show,
       sink_);
   scene_->SetAnnotations([this] { return annotations(); });
+  scene_->SetOnChange([this](const std::shared_ptr<const Scene>& scene) {
+    sink_.OnScene(scene);
+    views_[static_cast<std::size_t>(VideoView::kAugmented)]->RedrawNewest();
+  });
   pictures_->SetOnChange(
       [this](const std::shared_ptr<const PicturePause>& state) { OnPicturePause(state); });
 }

@@ -9,7 +9,7 @@
 #include "server/scene/placement.hpp"
 #include "server/scene/registration.hpp"
 #include "server/scene/scene_file.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {
@@ -131,9 +131,13 @@ std::shared_ptr<const Scene> SceneKeeper::scene() const {
 void SceneKeeper::Publish(Scene next) {
   next.revision = scene()->revision + 1;
   std::shared_ptr<const Sight> sight = SightOf(next);
-  const std::lock_guard lock(mutex_);
-  sight_ = std::move(sight);
-  scene_ = std::make_shared<const Scene>(std::move(next));
+  const auto published = std::make_shared<const Scene>(std::move(next));
+  {
+    const std::lock_guard lock(mutex_);
+    sight_ = std::move(sight);
+    scene_ = published;
+  }
+  on_change_(published);
 }
 
 absl::Status SceneKeeper::Submit(SceneCommand command) {

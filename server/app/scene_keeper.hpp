@@ -38,6 +38,11 @@ class SceneKeeper {
   /// Before the first Submit; what objects fixed to annotations move with.
   void SetAnnotations(Annotations annotations) { annotations_ = std::move(annotations); }
 
+  /// Before the first Submit; told of every change, on the keeper's thread, before its answer.
+  void SetOnChange(std::function<void(const std::shared_ptr<const Scene>&)> told) {
+    on_change_ = std::move(told);
+  }
+
   /// Never null.
   std::shared_ptr<const Scene> scene() const;
   /// Of what is real and stands still; null: there is nothing.
@@ -60,6 +65,7 @@ class SceneKeeper {
   void Publish(Scene next);
 
   Annotations annotations_;
+  std::function<void(const std::shared_ptr<const Scene>&)> on_change_ = [](const auto&) {};
   const std::unique_ptr<SceneStore> store_;  // null: none; the runner's thread
   mutable std::mutex mutex_;
   std::shared_ptr<const Scene> scene_ = std::make_shared<const Scene>();

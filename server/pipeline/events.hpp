@@ -9,6 +9,7 @@
 #include "shared/scene/annotation.hpp"
 #include "shared/scene/gaze.hpp"
 #include "shared/scene/map_snapshot.hpp"
+#include "shared/scene/scene_object.hpp"
 #include "shared/time/timestamp.hpp"
 
 namespace saccade {
@@ -74,6 +75,8 @@ class EventSink {
   virtual void OnEndOfSource(std::uint64_t frames) = 0;
   /// Once it returns, no picture goes out that was not on its way, until pictures are let go again.
   virtual void OnPicturePause(const std::shared_ptr<const PicturePause>& state) = 0;
+  /// After every change of the scene, in order.
+  virtual void OnScene(const std::shared_ptr<const Scene>& scene) = 0;
 };
 
 }  // namespace saccade

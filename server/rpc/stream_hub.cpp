@@ -68,6 +68,10 @@ void StreamHub::OnPointers(std::shared_ptr<const PointerList> pointers) {
   Leave([&](Pending& pending) { pointers_ = pending.pointers = std::move(pointers); });
 }
 
+void StreamHub::OnScene(const std::shared_ptr<const Scene>& scene) {
+  Leave([&](Pending& pending) { pending.scene = scene; });
+}
+
 void StreamHub::Connect(Backend* backend) {
   backend_ = backend;
   const std::lock_guard lock(mutex_);
@@ -165,6 +169,7 @@ struct StreamHub::Round {
   std::optional<std::uint64_t> end_frames;
   std::shared_ptr<const v1::PresenceEvent> presence;
   std::shared_ptr<const PointerList> pointers;
+  std::shared_ptr<const Scene> scene;
   std::shared_ptr<const ChatLog> chat;
   std::deque<VoiceBatch> voice;
 
@@ -182,6 +187,7 @@ struct StreamHub::Round {
     if (end_frames) subscription.OfferEnd(*end_frames);
     if (presence) subscription.OfferPresence(presence);
     if (pointers) subscription.OfferPointers(pointers);
+    if (scene) subscription.OfferScene(scene);
   }
 };
 
@@ -201,6 +207,7 @@ StreamHub::Round StreamHub::Prepare() {
     round.gaze = std::move(pending.gaze);
     round.end_frames = pending.end_frames;
     round.pointers = std::move(pending.pointers);
+    round.scene = std::move(pending.scene);
     round.voice = std::move(pending.voice);
     if (pending.chat) round.chat = chat_;
     if (presence_changed_ && now_ns - presence_ns_ >= kPresenceInterval) {
@@ -261,6 +268,7 @@ void StreamHub::Add(const std::shared_ptr<Subscriber>& subscriber) {
     subscriber->Update([&](Subscription& subscription) {
       if (state) subscription.Offer(*state);
       subscription.OfferGaze(backend_->gaze());
+      subscription.OfferScene(backend_->scene());
       if (end) subscription.OfferEnd(*end);
       subscription.OfferPresence(present);
       if (pointing) subscription.OfferPointers(pointing);

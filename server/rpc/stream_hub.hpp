@@ -101,6 +101,7 @@ class StreamHub : public EventSink {
   /// What is pointed at now. Any thread; must come in order.
   void OnPointers(std::shared_ptr<const PointerList> pointers);
   void OnPicturePause(const std::shared_ptr<const PicturePause>& state) override;
+  void OnScene(const std::shared_ptr<const Scene>& scene) override;
 
   /// To everybody who listens but the speaker.
   void OnVoice(VoiceBatch batch);
@@ -138,6 +139,7 @@ class StreamHub : public EventSink {
     std::shared_ptr<const GazeSnapshot> gaze;
     std::optional<std::uint64_t> end_frames;
     std::shared_ptr<const PointerList> pointers;
+    std::shared_ptr<const Scene> scene;
     std::deque<VoiceBatch> voice;
     bool chat = false;
   };

@@ -160,6 +160,8 @@ std::optional<Subscription::Payload> Subscription::Fill(Kind kind, Timestamp now
                                                   video_.skipped() + poses_skipped_))};
     case kPointers:
       return FillPointers();
+    case kScene:
+      return FillScene();
     case kEnd: {
       if (!end_frames_) return std::nullopt;
       v1::EndOfSource end;
@@ -206,6 +208,14 @@ std::optional<Subscription::Payload> Subscription::FillPointers() {
   pointers_due_ = !pointer_reader_.complete();
   if (!any) return std::nullopt;
   return Payload{v1::Event::kPointerFieldNumber, Serialized(event)};
+}
+
+// Nobody shares it: it is rare.
+std::optional<Subscription::Payload> Subscription::FillScene() {
+  if (!Has(v1::TOPIC_SCENE) || !std::exchange(scene_due_, false)) return std::nullopt;
+  v1::SceneEvent event;
+  if (!scene_reader_.Next(scene_, event)) return std::nullopt;
+  return Payload{v1::Event::kSceneFieldNumber, Serialized(event)};
 }
 
 // Who is behind gets it in parts; what is no longer kept is left out.

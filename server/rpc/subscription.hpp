@@ -18,6 +18,7 @@
 #include "server/rpc/deltas.hpp"
 #include "server/rpc/event_bytes.hpp"
 #include "server/rpc/pointer_reader.hpp"
+#include "server/rpc/scene_reader.hpp"
 #include "server/rpc/video_queue.hpp"
 #include "server/rpc/voice_queue.hpp"
 
@@ -56,6 +57,12 @@ class Subscription {
   void OfferPointers(std::shared_ptr<const PointerList> pointers) {
     pointers_ = std::move(pointers);
     pointers_due_ = true;
+  }
+  /// Never null; an older one than the last is passed over.
+  void OfferScene(std::shared_ptr<const Scene> scene) {
+    if (scene_ != nullptr && scene->revision <= scene_->revision) return;
+    scene_ = std::move(scene);
+    scene_due_ = true;
   }
   void OfferEnd(std::uint64_t frames) {
     if (!std::exchange(end_seen_, true)) end_frames_ = frames;
@@ -97,6 +104,7 @@ class Subscription {
     kVideo,
     kStatistics,
     kPointers,
+    kScene,
     kEnd,
     kKinds
   };
@@ -117,6 +125,7 @@ class Subscription {
   std::optional<Payload> FillMap();
   std::optional<Payload> FillVideo(Timestamp now_ns);
   std::optional<Payload> FillPointers();
+  std::optional<Payload> FillScene();
   std::optional<Payload> FillChat();
   std::optional<Payload> FillVoice();
 
@@ -140,6 +149,9 @@ class Subscription {
   std::shared_ptr<const PointerList> pointers_;  // null: none so far
   bool pointers_due_ = false;
   PointerReader pointer_reader_;
+  std::shared_ptr<const Scene> scene_;  // null: none so far
+  bool scene_due_ = false;
+  SceneReader scene_reader_;
   std::optional<EngineStatistics> statistics_;
   std::optional<std::uint64_t> end_frames_;
   bool end_seen_ = false;

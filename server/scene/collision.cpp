@@ -5,7 +5,7 @@
 
 #include <numeric>
 
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

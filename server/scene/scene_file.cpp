@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "server/scene/shapes.hpp"
 #include "shared/io/regular_file.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

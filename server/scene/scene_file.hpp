@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/scene/gltf_reader.hpp"
+#include "shared/models/gltf_reader.hpp"
 #include "shared/scene/scene_object.hpp"
 
 namespace saccade {

@@ -68,6 +68,7 @@ class WearerTee final : public EventSink {
   void OnPicturePause(const std::shared_ptr<const PicturePause>& state) override {
     next_.OnPicturePause(state);
   }
+  void OnScene(const std::shared_ptr<const Scene>& scene) override { next_.OnScene(scene); }
 
  private:
   EventSink& next_;

@@ -22,7 +22,7 @@ constexpr auto kServerOrder = std::to_array<string_view>(
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "talk", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder = std::to_array<string_view>(
-    {"version", "io", "geometry", "time", "audio", "camera", "scene", "marks", "wire", "render"});
+    {"version", "io", "geometry", "time", "audio", "camera", "scene", "models", "marks", "wire", "render"});
 
 // Folders that see less than what is above them: only snapshots, packets and commands.
 struct Restriction {

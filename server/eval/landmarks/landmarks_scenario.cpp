@@ -14,7 +14,7 @@
 #include "server/eval/run.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/statistics.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 #include "server/tracker/landmark_tracker.hpp"
 #include "server/tracker/square_pose.hpp"
 

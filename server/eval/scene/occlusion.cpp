@@ -12,9 +12,9 @@
 #include "server/eval/output_file.hpp"
 #include "server/eval/scene/random_room.hpp"
 #include "server/scene/scene_view.hpp"
-#include "server/scene/shapes.hpp"
 #include "server/sim/room.hpp"
 #include "server/sim/sim_source.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

@@ -13,7 +13,7 @@
 #include "server/eval/scene/placement_judge.hpp"
 #include "server/eval/scene/random_room.hpp"
 #include "server/scene/placement.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

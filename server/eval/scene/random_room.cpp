@@ -3,7 +3,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "saccade/v1/scene.grpc.pb.h"
 #include "tests/integration/stream/in_process_server.hpp"
 #include "tests/integration/stream/test_client.hpp"
@@ -179,6 +181,38 @@ TEST_F(SceneCalls, ARegistrationTellsItsErrorBeforeItIsAccepted) {
   request.set_accept(true);
   ASSERT_TRUE(Call(&v1::SceneService::Stub::RegisterObject, request, found).ok());
   EXPECT_NEAR(List().objects(0).parent_from_object().translation_m().x(), 2, 0.01);
+}
+
+// What one did the others are told; who comes later has all of it.
+TEST_F(SceneCalls, ChangesComeOnTheStream) {
+  v1::SubscribeRequest request;
+  request.add_topics(v1::TOPIC_SCENE);
+  client_->Subscribe(request);
+  const auto told = [](const TestClient& client, bool full, const std::string& name) {
+    return client.WaitFor([&](const std::vector<testing::ReceivedEvent>& events) {
+      return std::any_of(events.begin(), events.end(), [&](const testing::ReceivedEvent& one) {
+        const v1::SceneEvent& scene = one.event.scene();
+        return scene.full() == full && scene.upserted_size() == 1 &&
+               scene.upserted(0).name() == name;
+      });
+    });
+  };
+  ASSERT_TRUE(client_->WaitFor([](const auto& events) { return !events.empty(); }));
+  EXPECT_TRUE(client_->events()[0].event.scene().full());
+  AddRoom();
+  EXPECT_TRUE(told(*client_, false, "room"));
+  TestClient late(server_->address());
+  late.Subscribe(request);
+  EXPECT_TRUE(told(late, true, "room"));
+  const std::string id = List().objects(0).id();
+  v1::RemoveSceneObjectRequest remove;
+  remove.set_id(id);
+  v1::RemoveSceneObjectResponse removed;
+  ASSERT_TRUE(Call(&v1::SceneService::Stub::RemoveObject, remove, removed).ok());
+  EXPECT_TRUE(late.WaitFor([&id](const auto& events) {
+    const v1::SceneEvent& scene = events.back().event.scene();
+    return scene.removed_ids_size() == 1 && scene.removed_ids(0) == id;
+  }));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ import { Frustum } from './frustum';
 import { groundGrid } from './ground_grid';
 import { OrbitCamera } from './orbit';
 import { PathLine } from './path_line';
+import { ThingMeshes } from './thing_meshes';
 
 const FIELD_OF_VIEW_DEG = 45;
 const FRUSTUM_SHARE = 0.14; // of the distance looked from: the live picture keeps its size
@@ -46,6 +47,10 @@ export class MapView {
   private readonly cloud = new FeatureCloud();
   private readonly path = new PathLine();
   private readonly frustum: Frustum;
+  private readonly things: ThingMeshes;
+  private readonly thingScene = new THREE.Scene();
+  /** Whose edges stand out. */
+  selectedThing = '';
   private width = 0; // CSS px
   private height = 0;
   private framed: { centre: Vec3; radius: number } | undefined;
@@ -63,7 +68,15 @@ export class MapView {
   ) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware() });
     this.renderer.setClearColor('#131415');
+    this.renderer.autoClear = false;
     this.frustum = new Frustum(picture);
+    const placeOf = (id: string): Vec3 | undefined =>
+      session.annotations.get(id)?.anchor.pointInWorld;
+    this.things = new ThingMeshes(session.scene, placeOf, true);
+    const light = new THREE.DirectionalLight(0xffffff, 2);
+    light.target.position.set(0, 0, -1);
+    this.eye.add(light, light.target);
+    this.thingScene.add(this.things.object, this.eye, new THREE.AmbientLight(0xffffff, 1.2));
     this.scene.add(groundGrid(), this.cloud.object, this.path.object, this.frustum.object);
   }
 
@@ -135,13 +148,18 @@ export class MapView {
     const q = threeOrientation(pose);
     this.eye.position.set(p.x, p.y, p.z);
     this.eye.quaternion.set(q.x, q.y, q.z, q.w);
+    this.eye.updateMatrixWorld(); // it belongs to the second scene
+    this.renderer.clear();
     this.renderer.render(this.scene, this.eye);
+    // After the map, of which known surfaces hide nothing.
+    this.renderer.render(this.thingScene, this.eye);
     return true;
   }
 
   private updateContent(nowMs: number, shown: ShownFrame | undefined): void {
     this.contentMs = nowMs;
     if (this.cloud.update(this.session.map)) this.dirty = true;
+    if (this.things.update(this.selectedThing)) this.dirty = true;
     if (this.path.update(this.session.path)) this.dirty = true;
     this.updateFrustum(shown);
   }

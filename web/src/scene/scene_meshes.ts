@@ -1,6 +1,6 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
-import { threeFromWorld, threeOrientation } from '../geometry/axes';
+import { threeFromWorld, threeOrientation, worldFromThree } from '../geometry/axes';
 import { compose, type Rigid3 } from '../geometry/rigid3';
 import type { Vec3 } from '../geometry/vec3';
 import type { Thing } from '../session/scene_book';
@@ -35,6 +35,9 @@ export const depthOnly = (): THREE.ShaderMaterial =>
         gl_FragDepth = clamp(0.5 * ndc + 0.5, 0.0, 1.0);
       }`,
   });
+
+const EDGE_COLOUR = '#8b9097';
+const ACCENT_COLOUR = '#c4b0ff';
 
 const ORDER = { real: 0, virtual: 1, guide: 1, hidden: 2 } as const;
 
@@ -80,18 +83,70 @@ async function geometriesOf(
   return parts;
 }
 
-/** A thing as three.js draws it, in its own frame; glTF's axes are three.js' own. */
-export async function meshesOf(thing: Thing, model: Uint8Array | undefined): Promise<THREE.Group> {
+const MOST_POINTS = 50_000;
+
+/** Where a model has corners, in its own frame before its scale, each once. */
+export async function pointsOf(file: Uint8Array): Promise<Vec3[]> {
+  const { scene } = await new GLTFLoader().parseAsync(file.slice().buffer, '');
+  scene.updateMatrixWorld(true);
+  const points = new Map<string, Vec3>();
+  scene.traverse((node) => {
+    if (!(node instanceof THREE.Mesh)) return;
+    const mesh = node as THREE.Mesh;
+    const at = mesh.geometry.getAttribute('position');
+    const point = new THREE.Vector3();
+    for (let i = 0; i < at.count && points.size < MOST_POINTS; i++) {
+      point.fromBufferAttribute(at, i).applyMatrix4(mesh.matrixWorld);
+      const key = point.toArray().map((value) => value.toFixed(4));
+      points.set(key.join(), worldFromThree(point));
+    }
+  });
+  return [...points.values()];
+}
+
+/** Turns of an edge that are drawn [deg]. */
+const EDGE_DEG = 20;
+const MOST_WITH_EDGES = 60_000; // vertices: edges are found by all of them
+
+function edgesOf(geometry: THREE.BufferGeometry): THREE.LineSegments {
+  const material = new THREE.LineBasicMaterial({ color: EDGE_COLOUR });
+  const edges = new THREE.LineSegments(new THREE.EdgesGeometry(geometry, EDGE_DEG), material);
+  edges.frustumCulled = false;
+  edges.renderOrder = ORDER.virtual;
+  return edges;
+}
+
+/**
+ * A thing as three.js draws it, in its own frame; glTF's axes are three.js' own. `outside`: for an eye that is
+ * not in the room: one sees into it through its near walls, and what is real has edges.
+ */
+export async function meshesOf(
+  thing: Thing,
+  model: Uint8Array | undefined,
+  outside = false,
+): Promise<THREE.Group> {
   const group = new THREE.Group();
   for (const { geometry, color } of await geometriesOf(thing, model)) {
     const material =
       thing.material === 'real' ? depthOnly() : shaded(color, thing.material === 'hidden');
+    if (outside && thing.shape === 'room') material.side = THREE.BackSide;
     const mesh = new THREE.Mesh(geometry, material);
     mesh.renderOrder = ORDER[thing.material];
     mesh.frustumCulled = false;
     group.add(mesh);
+    const few = geometry.getAttribute('position').count <= MOST_WITH_EDGES;
+    if (outside && few && thing.material === 'real') group.add(edgesOf(geometry));
   }
   return group;
+}
+
+/** Edges of the selected thing stand out. */
+export function accent(group: THREE.Group, selected: boolean): void {
+  for (const child of group.children) {
+    if (!(child instanceof THREE.LineSegments)) continue;
+    const lines = child as THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+    lines.material.color.set(selected ? ACCENT_COLOUR : EDGE_COLOUR);
+  }
 }
 
 /** Puts it where it is; `anchor`: the place of the annotation that it moves with, if it does. */
@@ -108,7 +163,7 @@ export function pose(group: THREE.Group, thing: Thing, anchor: Vec3 | undefined)
 
 export function dispose(group: THREE.Group): void {
   for (const child of group.children) {
-    if (!(child instanceof THREE.Mesh)) continue;
+    if (!(child instanceof THREE.Mesh || child instanceof THREE.LineSegments)) continue;
     const mesh = child as THREE.Mesh<THREE.BufferGeometry, THREE.Material>;
     mesh.geometry.dispose();
     mesh.material.dispose();

@@ -5,7 +5,7 @@ import { clipFromEye, pinholeAround } from '../geometry/pinhole';
 import type { View } from '../geometry/view';
 import type { SceneBook } from '../session/scene_book';
 import type { Vec3 } from '../geometry/vec3';
-import { dispose, meshesOf, pose } from './scene_meshes';
+import { ThingMeshes } from './thing_meshes';
 
 const NEAR_M = 0.03;
 const FAR_M = 200;
@@ -38,17 +38,16 @@ export class SceneOverlay {
   private readonly eye = new THREE.PerspectiveCamera();
   private readonly screen = new THREE.Scene();
   private readonly flat = new THREE.OrthographicCamera(-1, 1, 1, -1, 0, 1);
-  private readonly groups = new Map<string, THREE.Group>();
-  private version = 0;
-  private building = false;
+  private readonly meshes: ThingMeshes;
   private lens: Camera | undefined;
   private pinhole: Camera | undefined;
   private target: THREE.WebGLRenderTarget | undefined;
 
   constructor(
     private readonly book: SceneBook,
-    private readonly placeOf: (annotationId: string) => Vec3 | undefined,
+    placeOf: (annotationId: string) => Vec3 | undefined,
   ) {
+    this.meshes = new ThingMeshes(book, placeOf, false);
     this.canvas.className = 'scene';
     this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, alpha: true });
     this.renderer.setClearColor(0x000000, 0);
@@ -56,24 +55,19 @@ export class SceneOverlay {
     const light = new THREE.DirectionalLight(0xffffff, 2);
     this.eye.add(light, light.target);
     light.target.position.set(0, 0, -1);
-    this.scene.add(this.eye, new THREE.AmbientLight(0xffffff, 1.2));
+    this.scene.add(this.meshes.object, this.eye, new THREE.AmbientLight(0xffffff, 1.2));
     this.eye.matrixAutoUpdate = true;
   }
 
   /** Draws what is seen from there; the canvas is hidden where there is nothing to draw. */
   draw(view: View | undefined): void {
-    this.rebuild();
+    this.meshes.update();
     const visible =
       view !== undefined && this.book.things.some(({ material }) => material !== 'real');
     this.canvas.hidden = !visible;
     if (!visible) return;
     this.useLens(view.camera);
     if (!this.pinhole) return;
-    for (const thing of this.book.things) {
-      const group = this.groups.get(thing.id);
-      if (group)
-        pose(group, thing, thing.annotationId ? this.placeOf(thing.annotationId) : undefined);
-    }
     const p = threeFromWorld(view.worldFromCamera.translation);
     const q = threeOrientation(view.worldFromCamera);
     this.eye.position.set(p.x, p.y, p.z);
@@ -106,32 +100,5 @@ export class SceneOverlay {
       blending: THREE.NoBlending, // premultiplied as it is
     });
     this.screen.add(new THREE.Mesh(bentGrid(lens, this.pinhole), material));
-  }
-
-  private rebuild(): void {
-    if (this.building || this.version === this.book.version) return;
-    this.building = true;
-    const { version, things, models } = this.book;
-    void Promise.all(
-      things.map(
-        async (thing) => [thing.id, await meshesOf(thing, models.get(thing.modelId))] as const,
-      ),
-    )
-      .then((made) => {
-        for (const group of this.groups.values()) {
-          this.scene.remove(group);
-          dispose(group);
-        }
-        this.groups.clear();
-        for (const [id, group] of made) {
-          this.groups.set(id, group);
-          this.scene.add(group);
-        }
-      })
-      .catch(() => undefined) // a model that three.js cannot read is not drawn
-      .finally(() => {
-        this.version = version;
-        this.building = false;
-      });
   }
 }

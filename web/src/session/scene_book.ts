@@ -2,7 +2,8 @@ import type { Rigid3 } from '../geometry/rigid3';
 import type { Vec3 } from '../geometry/vec3';
 import {
   type GetModelResponse,
-  type ListSceneResponse,
+  type SceneEvent,
+  type SceneModelFacts,
   type SceneObject,
   SceneMaterial,
   SceneShape,
@@ -26,9 +27,16 @@ export interface Thing {
   readonly colorRgba: number;
 }
 
+/** A GLB file that things are made of. */
+export interface Model {
+  readonly id: string;
+  readonly name: string;
+  readonly bytes: number;
+  readonly sizeM: Vec3; // of its box
+}
+
 /** What the book asks of the server. */
-export interface SceneCalls {
-  listScene(request: { sessionId: string; knownRevision: bigint }): Promise<ListSceneResponse>;
+export interface ModelCalls {
   getModel(request: {
     sessionId: string;
     modelId: string;
@@ -51,7 +59,7 @@ const MATERIALS: Record<SceneMaterial, Material> = {
   [SceneMaterial.HIDDEN]: 'hidden',
 };
 
-const toThing = (pb: SceneObject): Thing => ({
+export const toThing = (pb: SceneObject): Thing => ({
   id: pb.id,
   name: pb.name,
   shape: SHAPES[pb.shape],
@@ -64,38 +72,68 @@ const toThing = (pb: SceneObject): Thing => ({
   colorRgba: pb.colorRgba,
 });
 
-/** The scene as the server has it, asked for again and again; models are fetched once. */
+export const toModel = (pb: SceneModelFacts): Model => ({
+  ...{ id: pb.id, name: pb.name, bytes: pb.bytes, sizeM: toVec3(pb.sizeM) },
+});
+
+/** The scene as the stream tells it; the models' files are fetched once. */
 export class SceneBook {
   things: readonly Thing[] = [];
-  readonly models = new Map<string, Uint8Array>(); // GLB files
+  models: readonly Model[] = [];
+  readonly files = new Map<string, Uint8Array>(); // GLB, by model
   version = 0; // rises with each change
-  private revision = 0n;
-  private asking = false;
+  private readonly fetching = new Set<string>();
 
-  /** Looks for news; one look at a time. What fails is tried again at the next. */
-  async look(calls: SceneCalls, sessionId: string): Promise<void> {
-    if (this.asking || sessionId === '') return;
-    this.asking = true;
+  apply(event: SceneEvent, calls: ModelCalls, sessionId: string): void {
+    const kept = event.full ? [] : this.things;
+    const changed = new Map(event.upserted.map((pb) => [pb.id, toThing(pb)]));
+    const removed = new Set(event.removedIds);
+    const things = kept
+      .filter(({ id }) => !removed.has(id))
+      .map((one) => changed.get(one.id) ?? one);
+    const known = new Set(kept.map(({ id }) => id));
+    this.things = [...things, ...[...changed.values()].filter(({ id }) => !known.has(id))];
+    this.models = [...(event.full ? [] : this.models), ...event.addedModels.map(toModel)];
+    this.version++;
+    for (const model of this.models) void this.fetch(model, calls, sessionId);
+  }
+
+  /** What the server has answered: the stream says it again. */
+  put(thing: Thing): void {
+    const there = this.thing(thing.id) !== undefined;
+    this.things = there
+      ? this.things.map((one) => (one.id === thing.id ? thing : one))
+      : [...this.things, thing];
+    this.version++;
+  }
+
+  remove(id: string): void {
+    this.things = this.things.filter((one) => one.id !== id);
+    this.version++;
+  }
+
+  thing(id: string): Thing | undefined {
+    return this.things.find((one) => one.id === id);
+  }
+
+  /** What failed is tried again with the next change. */
+  private async fetch(model: Model, calls: ModelCalls, sessionId: string): Promise<void> {
+    const { id, bytes } = model;
+    if (this.files.has(id) || this.fetching.has(id)) return;
+    this.fetching.add(id);
     try {
-      const answer = await calls.listScene({ sessionId, knownRevision: this.revision });
-      if (answer.revision === this.revision) return;
-      for (const { id, bytes } of answer.models) {
-        if (!this.models.has(id))
-          this.models.set(id, await fetchModel(calls, sessionId, id, bytes));
-      }
-      this.things = answer.objects.map(toThing);
-      this.revision = answer.revision;
+      this.files.set(id, await fetchModel(calls, sessionId, id, bytes));
       this.version++;
     } catch {
       // The link says so elsewhere.
     } finally {
-      this.asking = false;
+      this.fetching.delete(id);
     }
   }
 }
 
 async function fetchModel(
-  calls: SceneCalls,
+  calls: ModelCalls,
   sessionId: string,
   modelId: string,
   bytes: number,

@@ -1,6 +1,6 @@
 import type { AccessUnit } from '../gen/saccade/v1/video_pb';
 import { VideoView } from '../gen/saccade/v1/video_pb';
-import type { Event, JoinResponse, Topic } from '../gen/saccade/v1/session_pb';
+import type { Event, JoinResponse } from '../gen/saccade/v1/session_pb';
 import type { Clients } from '../transport/clients';
 import { Backoff } from '../transport/backoff';
 import { isRefusal, isReplaced, streamEndWords } from '../transport/errors';
@@ -13,32 +13,17 @@ import { FrameReader } from './frame_reader';
 import type { Gaze } from './gaze';
 import { toGaze } from './gaze_convert';
 import { Joining } from './joining';
-import type { KeptSession } from './kept_session';
 import { MapState } from './map_state';
 import { follow } from './path';
 import type { PictureSink } from './picture_sink';
 import { PointerBook } from './pointers';
 import { FrameRing } from './ring';
+import { SceneBook } from './scene_book';
+import type { SessionOptions } from './session_options';
 import { silenceWords } from './silence';
 import { sleep } from './sleep';
-import type { Tabs } from './tabs';
 import { TalkState } from './talk_state';
-import type { FrameFacts, Link, Participant, Pose, Role, Scale, Statistics, View } from './types';
-
-export interface SessionOptions {
-  readonly role: Role;
-  readonly view: View;
-  readonly name: string;
-  readonly topics?: Topic[]; // absent: all
-  /** Where the session is kept for a reload; without it, only while the page lives. */
-  readonly kept?: KeptSession;
-  /** The secret of whoever sits here; absent: a person of this session alone. */
-  readonly personKey?: string;
-  /** The other tabs of this browser, where they can be asked. */
-  readonly tabs?: Tabs;
-  /** Before joining: redeems an invite, and waits to be let in. Rejects if nobody lets one in. */
-  readonly enter?: (signal: AbortSignal, name: string, waiting: () => void) => Promise<void>;
-}
+import type { FrameFacts, Link, Participant, Pose, Scale, Statistics } from './types';
 
 const WINDOW = 32;
 const SILENCE_MS = 4000; // statistics come every second
@@ -64,6 +49,7 @@ export class Session {
   readonly path: Pose[] = [];
   readonly clock = new ClockOffset();
   readonly talk = new TalkState();
+  readonly scene = new SceneBook();
   private readonly reader = new FrameReader();
   private heardMs = 0; // when the stream last told something; 0: not yet
   private lastEventMs = 0;
@@ -279,6 +265,9 @@ export class Session {
         break;
       case 'pointer':
         this.pointers.apply(event.value, this.participantId, this.lastEventMs);
+        break;
+      case 'scene':
+        this.scene.apply(event.value, this.clients.scene, this.sessionId);
         break;
       default:
         this.talk.receive(event);

@@ -1,6 +1,6 @@
 import type { Shape } from '../session/types';
 
-export type ToolName = 'select' | 'area' | 'laser' | 'gaze' | Shape;
+export type ToolName = 'select' | 'area' | 'laser' | 'gaze' | 'thing' | Shape;
 export type CommandName =
   | 'undo'
   | 'redo'
@@ -103,6 +103,13 @@ export const TOOLS: readonly Control<ToolName>[] = [
     key: 'u',
     shown: 'U',
     hint: 'click its place, then choose a picture or a page of a PDF; or drop a file there',
+  },
+  {
+    name: 'thing',
+    label: 'Things',
+    key: '4',
+    shown: '4',
+    hint: 'furniture and machines to try: place them, push them to the wall; measure what is there',
   },
   {
     name: 'gaze',
@@ -229,7 +236,7 @@ export const TURNS: readonly Control<TurnName>[] = [
   { name: 'turn_right', label: 'Turn', key: '.', shown: '.', hint: 'the other way; Shift: tip it' },
 ];
 
-const NO_SHAPE: readonly ToolName[] = ['select', 'area', 'laser', 'gaze'];
+const NO_SHAPE: readonly ToolName[] = ['select', 'area', 'laser', 'gaze', 'thing'];
 
 export const shapeOf = (tool: ToolName): Shape | undefined =>
   NO_SHAPE.includes(tool) ? undefined : (tool as Shape);

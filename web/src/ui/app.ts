@@ -39,6 +39,8 @@ import { Sheets } from './sheets';
 import { Strip } from './strip';
 import { handleTalkKeys } from './talk_keys';
 import { TalkPanel } from './talk_panel';
+import { Things } from './things';
+import { ThingsPanel } from './things_panel';
 import { ToolNames } from './tool_names';
 import { ToolsColumn } from './tools_column';
 import { VideoPane } from './video_pane';
@@ -75,6 +77,7 @@ export class App {
   private readonly notice: HandoverNotice;
   private readonly hand: Hand;
   private readonly talk: TalkPanel;
+  private readonly thingsPanel: ThingsPanel;
   private readonly firstTask: FirstTask;
   private readonly stage = h('main', {});
   private nameless = isNameless(location.search, storage());
@@ -100,11 +103,14 @@ export class App {
     const notes = new Notes(session, edits, state);
     const aim = new Aim(session, state, this.map, this.video);
     const measuring = new Measuring(session, edits, state);
+    const things = new Things(session, state, aim);
+    this.thingsPanel = new ThingsPanel(session, state, things);
+    things.focus = () => this.thingsPanel.focus();
     const dialogs = { list: new ListDialog(), picture: new PictureDialog() };
     const controller = new Controller(session, edits, state, {
-      ...{ aim, gaze, notes, measuring },
+      ...{ aim, gaze, notes, measuring, things },
       placer: new Placer(session, edits, state, aim, notes, measuring, dialogs),
-      grips: new Grips(session, edits, state, aim),
+      grips: new Grips(session, edits, state, aim, things),
       selected: new SelectedMarks(session, edits, state, aim),
     });
     this.hand = controller.hand;
@@ -122,7 +128,7 @@ export class App {
     this.help.onFirstTask = () => this.firstTask.begin();
     new ToolNames(this.tools.element);
     this.stage.append(this.map.element, this.video.element, this.notice.element);
-    this.stage.append(this.firstTask.element);
+    this.stage.append(this.firstTask.element, this.thingsPanel.element);
     this.element = h('div', { class: 'app' });
     this.element.append(
       this.header.element,
@@ -210,7 +216,7 @@ export class App {
     this.pilot.check();
     const version = [
       ...[state.version, session.annotations.changes, session.link.kind],
-      ...[this.pilot.version, gazeKey(session.gaze), session.talk.version],
+      ...[this.pilot.version, gazeKey(session.gaze), session.talk.version, session.scene.version],
     ].join();
     if (version === this.panelsVersion && nowMs - this.panelsMs < PANEL_MS) return;
     this.panelsVersion = version;
@@ -227,6 +233,7 @@ export class App {
     this.talk.update();
     this.firstTask.update();
     this.gaze.update();
+    this.thingsPanel.update();
     setClass(this.element, 'no-head', !hasHead(session.gaze));
     if (hasHead(session.gaze)) this.pilot.warm();
   }

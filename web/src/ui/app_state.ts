@@ -34,6 +34,8 @@ export class AppState {
   hover: Hover | undefined;
   /** Where the mouse is, in pixels of the page. */
   pointer: { readonly pane: PaneName; readonly x: number; readonly y: number } | undefined;
+  /** The selected thing of the scene; empty: none. */
+  thingId = '';
   main: PaneName = 'map';
   sheet: SheetName | undefined;
   confirmingReset = false;

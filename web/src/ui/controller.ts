@@ -12,6 +12,7 @@ import type { Notes } from './notes';
 import type { Placer } from './placer';
 import { whyNotChange, whyNotEdit } from './rights';
 import type { SelectedMarks } from './selected_marks';
+import { type Spot, spotAt } from './thing_spot';
 import type { ToolActions } from './tools_column';
 
 /** What clicks and keys are handed to. */
@@ -22,7 +23,7 @@ export interface Helpers extends HandHelpers {
   readonly selected: SelectedMarks;
 }
 
-const NO_EDIT: readonly ToolName[] = ['select', 'area', 'gaze'];
+const NO_EDIT: readonly ToolName[] = ['select', 'area', 'gaze', 'thing'];
 
 /** What a click or key does, given the tool in hand. */
 export class Controller implements ToolActions, AnnotationActions {
@@ -44,6 +45,7 @@ export class Controller implements ToolActions, AnnotationActions {
       tool === 'gaze' ? this.with_.gaze.whyNot() : edits ? whyNotEdit(this.session) : undefined;
     if (whyNot) return state.refuse(tool, whyNot);
     this.hand.letGo();
+    if (tool === 'thing' && state.tool === tool) this.with_.things.focus();
     state.tool = tool;
     state.hover = undefined;
     state.changed();
@@ -54,6 +56,12 @@ export class Controller implements ToolActions, AnnotationActions {
     const { map, video } = this.with_.aim;
     switch (command) {
       case 'undo':
+        if (state.tool === 'thing') {
+          this.with_.things.undo();
+          break;
+        }
+        void attempt(state, command, () => this.edits[command]());
+        break;
       case 'redo':
         void attempt(state, command, async () => {
           const words = await this.edits[command]();
@@ -61,7 +69,8 @@ export class Controller implements ToolActions, AnnotationActions {
         });
         break;
       case 'delete':
-        this.with_.selected.remove();
+        if (state.tool === 'thing') this.with_.things.remove();
+        else this.with_.selected.remove();
         break;
       case 'copy':
       case 'paste':
@@ -174,10 +183,12 @@ export class Controller implements ToolActions, AnnotationActions {
     landing: Landing | undefined,
     picked: Annotation | undefined,
     adds: boolean,
+    spot: Spot | undefined,
   ): void {
     const { state } = this;
     const { notes, placer } = this.with_;
     if (notes.takeClick()) return;
+    if (state.tool === 'thing') return this.with_.things.click(pane, spot);
     if (state.tool === 'gaze') return this.look(pane, landing, picked);
     const shape = shapeOf(state.tool);
     if (shape) return placer.click(shape, pane, landing);
@@ -219,6 +230,10 @@ export class Controller implements ToolActions, AnnotationActions {
     const landing = pixel && aim.landing(pane, pixel, true);
     const why = whyNotEdit(this.session);
     if (why !== undefined) return this.state.refuse(pane, why);
+    if (/\.glb$/i.test(file.name)) {
+      this.choose('thing');
+      return this.with_.things.take(pane, pixel && spotAt(aim, pane, pixel), file);
+    }
     if (landing) return void placer.picture(pane, landing, file);
     this.state.refuse(pane, `Not placed: ${aim.whyNoLanding(pane)}`);
   }

@@ -3,6 +3,7 @@ import type { Edits } from '../session/edits';
 import type { Session } from '../session/session';
 import type { Annotation } from '../session/types';
 import { handleOf } from '../tools/handle';
+import { pickThing } from '../tools/thing_rays';
 import type { Aim } from './aim';
 import type { AppState, PaneName } from './app_state';
 import { AreaDrag } from './area_drag';
@@ -12,6 +13,9 @@ import { InkDrag } from './ink_drag';
 import { LaserDrag } from './laser_drag';
 import { MoveDrag } from './move_drag';
 import { whyNotChange, whyNotEdit } from './rights';
+import { ThingDrag } from './thing_drag';
+import { spotAt } from './thing_spot';
+import type { Things } from './things';
 import { TurnDrag } from './turn_drag';
 
 const HANDLE_PX = 16; // CSS px
@@ -30,6 +34,7 @@ export class Grips {
     private readonly edits: Edits,
     private readonly state: AppState,
     private readonly aim: Aim,
+    private readonly things: Things,
   ) {}
 
   /** Undefined: a click, or a turn of the map. */
@@ -48,6 +53,8 @@ export class Grips {
         return this.may(pane) ? this.ink(pane, pixel, press) : undefined;
       case 'box':
         return this.may(pane) ? this.box(pane, pixel) : undefined;
+      case 'thing':
+        return this.thing(pane, pixel);
       case 'select':
         return this.take(pane, pixel, press);
       default:
@@ -60,6 +67,16 @@ export class Grips {
     const reason = why ?? (this.session.live ? undefined : 'No connection to the server.');
     if (reason !== undefined) this.state.refuse(pane, reason);
     return reason === undefined;
+  }
+
+  /** The selected thing is pushed; any other press is a click, or turns the map. */
+  private thing(pane: PaneName, pixel: Pixel): Drag | undefined {
+    const { session, state, aim, things } = this;
+    const spot = things.clickDoes === 'select' ? spotAt(aim, pane, pixel) : undefined;
+    const { things: all, models } = session.scene;
+    const picked = spot && pickThing(all, models, spot.ray);
+    if (!picked || picked.id !== state.thingId || !this.may(pane)) return undefined;
+    return new ThingDrag(session, state, aim, pane, picked, (way) => things.pushTowards(way));
   }
 
   private laser(pane: PaneName, { x, y }: Press): Drag {

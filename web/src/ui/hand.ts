@@ -7,11 +7,14 @@ import type { Drag } from './drag';
 import type { Grips } from './grips';
 import type { Measuring } from './measuring';
 import type { PaneGestures } from './pointer';
+import { type Spot, spotAt } from './thing_spot';
+import type { Things } from './things';
 
 export interface HandHelpers {
   readonly aim: Aim;
   readonly measuring: Measuring;
   readonly grips: Grips;
+  readonly things: Things;
 }
 
 export interface HandActions {
@@ -20,6 +23,7 @@ export interface HandActions {
     landing: Landing | undefined,
     picked: Annotation | undefined,
     adds: boolean,
+    spot: Spot | undefined,
   ): void;
   point(id: string | undefined): void;
 }
@@ -31,7 +35,13 @@ const HOLDING = 'Held: move, then Enter lets go; Esc gives up';
 /** A pointer or the keyboard in the panes: what is under it, what it holds, what it clicks. */
 export class Hand {
   /** What was under the pointer when it went down: the picture may change before it comes up. */
-  private pressed: { landing: Landing | undefined; picked: Annotation | undefined } | undefined;
+  private pressed:
+    | {
+        landing: Landing | undefined;
+        picked: Annotation | undefined;
+        spot: Spot | undefined;
+      }
+    | undefined;
   private drag: Drag | undefined;
   /** A drag that keys hold: Enter to Enter. */
   private keyDrag: { readonly drag: Drag; readonly pane: PaneName } | undefined;
@@ -44,12 +54,15 @@ export class Hand {
 
   /** True where there is something to give up. */
   get busy(): boolean {
-    return this.drag !== undefined || this.keyDrag !== undefined || this.with_.measuring.begun;
+    const { measuring, things } = this.with_;
+    const holds = this.drag !== undefined || this.keyDrag !== undefined;
+    return holds || measuring.begun || things.begun;
   }
 
   /** Whatever is under way has not been. */
   letGo(): void {
     this.with_.measuring.cancel();
+    this.with_.things.cancel();
     for (const drag of [this.drag, this.keyDrag?.drag]) drag?.cancel();
     this.drag = this.keyDrag = undefined;
   }
@@ -93,6 +106,7 @@ export class Hand {
     this.pressed = pixel && {
       landing: aim.landing(pane, pixel, late),
       picked: aim.pick(pane, pixel),
+      spot: this.state.tool === 'thing' ? spotAt(aim, pane, pixel) : undefined,
     };
   }
 
@@ -100,7 +114,7 @@ export class Hand {
     if (pane === 'map') this.press(pane, x, y); // it may have turned since it was pressed
     const { pressed } = this;
     this.pressed = undefined;
-    this.acts.act(pane, pressed?.landing, pressed?.picked, adds);
+    this.acts.act(pane, pressed?.landing, pressed?.picked, adds, pressed?.spot);
   }
 
   /** Enter in a pane: clicks at its keyboard place, or takes hold there and lets go with the next. */
@@ -159,7 +173,8 @@ export class Hand {
       state.moved();
       return this.pointAt(pixel && aim.pick(pane, pixel)?.id);
     }
-    const landing = pixel && aim.landing(pane, pixel);
+    const spot = pixel && state.tool === 'thing' ? spotAt(aim, pane, pixel) : undefined;
+    const landing = spot ? this.with_.things.landing(spot) : pixel && aim.landing(pane, pixel);
     const words = state.tool === 'measure' ? measuring.hover(landing) : undefined;
     state.hover = pixel && { pane, pixel, landing, words };
     state.moved();

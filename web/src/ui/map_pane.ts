@@ -82,6 +82,7 @@ export class MapPane extends Pane {
     if (!map) return;
     map.resize(width, height);
     map.pictureIntervalMs = screenFps > 0 && screenFps < 45 ? 150 : 0;
+    map.selectedThing = this.state.tool === 'thing' ? this.state.thingId : '';
     const moved = map.draw(nowMs, this.eye());
     this.drawPointers();
     const { version } = this.session.annotations;

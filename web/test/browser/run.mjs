@@ -58,6 +58,7 @@ const PARTS = {
   shapes: async () => (await import('./drawn_shapes.mjs')).runShapes,
   keys: async () => (await import('./keyboard.mjs')).runKeyboard,
   shots: async () => (await import('./shots.mjs')).runShots,
+  things: async () => (await import('./things.mjs')).runThings,
   oidc: async () => (await import('./oidc.mjs')).runOidc,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);

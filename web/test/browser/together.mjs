@@ -432,7 +432,7 @@ async function viewer(context) {
 }
 
 /** A gRPC-Web frame of JoinRequest with the role (field 2) of a viewer. */
-function asViewer(body) {
+export function asViewer(body) {
   const message = body.subarray(5);
   const at = message.indexOf(Buffer.from([0x10, Role.EXPERT]));
   message[at + 1] = Role.VIEWER;

@@ -4,11 +4,15 @@ import { Camera } from '../../src/geometry/camera';
 import { clipFromEye, pinholeAround } from '../../src/geometry/pinhole';
 import {
   GetModelResponseSchema,
-  ListSceneResponseSchema,
+  SceneEventSchema,
   SceneMaterial,
   SceneShape,
 } from '../../src/gen/saccade/v1/scene_pb';
-import { SceneBook, type SceneCalls } from '../../src/session/scene_book';
+import { IDENTITY, rotate, transform } from '../../src/geometry/rigid3';
+import { distance, ZERO } from '../../src/geometry/vec3';
+import { type ModelCalls, SceneBook, type Thing } from '../../src/session/scene_book';
+import { beforeWall, boxOf, facing, planeOf, turnDeg } from '../../src/tools/thing_places';
+import { cornersOf, hitSurface, pickThing } from '../../src/tools/thing_rays';
 
 const LENS = new Camera({
   model: 'brown_conrady',
@@ -45,25 +49,7 @@ describe('the pinhole camera around a lens', () => {
 });
 
 describe('the book of the scene', () => {
-  const calls = (data: Uint8Array, log: string[]): SceneCalls => ({
-    listScene: ({ knownRevision }) => {
-      log.push(`list ${knownRevision}`);
-      if (knownRevision === 3n) {
-        return Promise.resolve(create(ListSceneResponseSchema, { revision: 3n }));
-      }
-      return Promise.resolve(
-        create(ListSceneResponseSchema, {
-          revision: 3n,
-          objects: [
-            {
-              ...{ id: 'a', name: 'shelf', modelId: 'm', scale: 0 },
-              ...{ shape: SceneShape.MODEL, material: SceneMaterial.VIRTUAL },
-            },
-          ],
-          models: [{ id: 'm', name: 'shelf', bytes: 5 }],
-        }),
-      );
-    },
+  const calls = (data: Uint8Array, log: string[]): ModelCalls => ({
     getModel: ({ offsetBytes }) => {
       log.push(`model ${offsetBytes}`);
       return Promise.resolve(
@@ -74,23 +60,134 @@ describe('the book of the scene', () => {
       );
     },
   });
+  const shelf = { id: 'a', name: 'shelf', modelId: 'm', scale: 0 };
+  const kinds = { shape: SceneShape.MODEL, material: SceneMaterial.VIRTUAL };
+  const settled = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 5));
 
-  it('fetches each model once, in pieces, and nothing while nothing is new', async () => {
+  it('has all of it first, then what changed; a model is fetched once, in pieces', async () => {
     const book = new SceneBook();
     const log: string[] = [];
     const server = calls(new Uint8Array([1, 2, 3, 4, 5]), log);
-    await book.look(server, 's');
-    await book.look(server, 's');
-    expect(log).toEqual(['list 0', 'model 0', 'model 3', 'list 3']);
-    expect([...book.models.get('m')!]).toEqual([1, 2, 3, 4, 5]);
-    expect(book.things[0]).toMatchObject({ name: 'shelf', material: 'virtual', scale: 1 });
-    expect(book.version).toBe(1);
+    const first = {
+      ...{ revision: 3n, full: true, upserted: [{ ...shelf, ...kinds }] },
+      addedModels: [{ id: 'm', name: 'shelf', bytes: 5 }],
+    };
+    book.apply(create(SceneEventSchema, first), server, 's');
+    await settled();
+    const second = {
+      revision: 4n,
+      upserted: [
+        { ...shelf, ...kinds, name: 'rack' },
+        { id: 'b', name: 'box', shape: SceneShape.BOX },
+      ],
+    };
+    book.apply(create(SceneEventSchema, second), server, 's');
+    await settled();
+    expect(log).toEqual(['model 0', 'model 3']);
+    expect([...book.files.get('m')!]).toEqual([1, 2, 3, 4, 5]);
+    expect(book.things.map(({ name }) => name)).toEqual(['rack', 'box']);
+    expect(book.things[0]).toMatchObject({ material: 'virtual', scale: 1 });
+    book.apply(create(SceneEventSchema, { revision: 5n, removedIds: ['a'] }), server, 's');
+    expect(book.things.map(({ name }) => name)).toEqual(['box']);
+    book.apply(create(SceneEventSchema, { revision: 1n, full: true }), server, 's');
+    expect(book.things).toEqual([]);
   });
 
-  it('keeps what it has when a model is torn', async () => {
+  it('tries again, with the next change, what came torn', async () => {
     const book = new SceneBook();
-    await book.look(calls(new Uint8Array([1, 2]), []), 's');
-    expect(book.things).toEqual([]);
-    expect(book.version).toBe(0);
+    const log: string[] = [];
+    const model = { id: 'm', name: 'shelf', bytes: 5 };
+    const event = create(SceneEventSchema, { full: true, addedModels: [model] });
+    book.apply(event, calls(new Uint8Array([1, 2]), log), 's');
+    await settled();
+    expect(book.files.size).toBe(0);
+    const whole = calls(new Uint8Array([1, 2, 3, 4, 5]), log);
+    book.apply(create(SceneEventSchema, { revision: 2n }), whole, 's');
+    await settled();
+    expect(book.files.get('m')!.length).toBe(5);
+  });
+});
+
+const thing = (more: Partial<Thing>): Thing => ({
+  ...{ id: 'r', name: 'room', shape: 'room', material: 'real', modelId: '', scale: 1 },
+  ...{ sizeM: { x: 4, y: 2.5, z: 4 }, annotationId: '', colorRgba: 0 },
+  ...{ parentFromObject: IDENTITY, ...more },
+});
+
+describe('where things come to stand', () => {
+  const room = thing({});
+  const box = thing({ id: 'b', shape: 'box', sizeM: { x: 1, y: 0.7, z: 0.6 } });
+
+  it('a sight meets the nearest surface: a room from inside, a box from outside', () => {
+    const ray = {
+      originInWorld: { x: 0, y: -1.5, z: -1.5 },
+      directionInWorld: { x: 0, y: 0.8, z: 1.2 },
+    };
+    const hit = hitSurface([room, box], ray)!;
+    expect(hit.thing.id).toBe('b');
+    expect(hit.pointInWorld.y).toBeCloseTo(-0.7, 9);
+    expect(hit.normalInWorld).toEqual({ x: 0, y: -1, z: 0 });
+    const wall = hitSurface([room], { ...ray, directionInWorld: { x: 1, y: 0, z: 0 } })!;
+    expect(wall.pointInWorld).toEqual({ x: 2, y: -1.5, z: -1.5 });
+    expect(wall.normalInWorld.x).toBe(-1);
+    expect(pickThing([room, box], [], ray)?.id).toBe('b');
+    const up = { ...ray, originInWorld: { x: 9, y: 9, z: 9 } };
+    expect(hitSurface([room, box], up)).toBeUndefined();
+  });
+
+  it('before a wall it has its back to it, and is pushed into it', () => {
+    const { start, push } = beforeWall(
+      { x: 2, y: -1, z: 0.5 },
+      { x: -1, y: 0, z: 0 },
+      { x: 1, y: 0.2, z: 0 },
+      0.4,
+      0,
+    );
+    expect(push.x).toBeCloseTo(1, 12);
+    expect(start.translation.x).toBeCloseTo(2 - 0.2 - 0.3, 9);
+    expect(start.translation.y).toBeCloseTo(-0.05, 9);
+    expect(turnDeg(start)).toBeCloseTo(90, 9);
+  });
+
+  it('a plane lies through three points and faces the eye', () => {
+    const made = planeOf(
+      { x: 0, y: -1, z: 1 },
+      { x: 2, y: -1, z: 1 },
+      { x: 0.5, y: -2, z: 1 },
+      { x: 0, y: -1, z: -3 },
+    );
+    if (typeof made === 'string') throw new Error(made);
+    expect(made.sizeM.x).toBeCloseTo(2, 9);
+    expect(made.sizeM.z).toBeCloseTo(1, 9);
+    const { pose } = made;
+    const up = rotate(pose.rotation, { x: 0, y: -1, z: 0 });
+    expect(up.z).toBeCloseTo(-1, 9);
+    for (const corner of cornersOf(thing({ shape: 'plane', sizeM: made.sizeM }))) {
+      const at = transform(pose, corner);
+      expect(at.z).toBeCloseTo(1, 9);
+      expect(Math.min(Math.abs(at.x), Math.abs(at.x - 2))).toBeCloseTo(0, 9);
+      expect(Math.min(Math.abs(at.y + 1), Math.abs(at.y + 2))).toBeCloseTo(0, 9);
+    }
+    expect(planeOf({ x: 0, y: 0, z: 0 }, { x: 1, y: 0, z: 0 }, { x: 2, y: 0, z: 0 }, ZERO)).toMatch(
+      /of a line/,
+    );
+  });
+
+  it('a box has the corners that were clicked, however it is turned', () => {
+    const rotation = facing({ x: 1, y: 0, z: 1 });
+    const [a, b] = [
+      { x: 1, y: 0, z: 1 },
+      { x: 2, y: -0.8, z: 1.4 },
+    ];
+    const made = boxOf(a, b, rotation);
+    if (typeof made === 'string') throw new Error(made);
+    expect(made.sizeM.y).toBeCloseTo(0.8, 9);
+    const corners = cornersOf(thing({ shape: 'box', sizeM: made.sizeM })).map((corner) =>
+      transform(made.pose, corner),
+    );
+    for (const clicked of [a, b]) {
+      expect(Math.min(...corners.map((corner) => distance(corner, clicked)))).toBeCloseTo(0, 9);
+    }
+    expect(boxOf(a, { ...b, y: 0 }, rotation)).toMatch(/0 mm high/);
   });
 });

@@ -7,7 +7,7 @@
 #include "server/eval/landmarks/squares_source.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/score.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 #include "server/tracker/landmark_tracker.hpp"
 #include "server/tracker/make_tracker.hpp"
 

@@ -151,6 +151,40 @@ TEST(Subscription, ChatIsWhatIsSaidFromNowOnInOrderAndOnce) {
   EXPECT_FALSE(subscription.Next(0, event));
 }
 
+TEST(Subscription, SceneIsAllOfItFirstAndThenWhatChanged) {
+  Subscription subscription(Topics({v1::TOPIC_SCENE}));
+  const auto publish = [&](std::uint64_t revision, const std::vector<SceneObject>& objects) {
+    Scene scene;
+    scene.revision = revision;
+    scene.objects = objects;
+    subscription.OfferScene(std::make_shared<const Scene>(scene));
+  };
+  SceneObject room, crate;
+  room.id = "r";
+  crate.id = "c";
+  publish(1, {room});
+  v1::Event event;
+  ASSERT_TRUE(subscription.Next(0, event));
+  EXPECT_TRUE(event.scene().full());
+  ASSERT_EQ(event.scene().upserted_size(), 1);
+  publish(2, {room, crate});
+  crate.parent_from_object.translation.x() = 0.5;
+  publish(3, {room, crate});
+  publish(2, {room});  // late
+  ASSERT_TRUE(subscription.Next(0, event));
+  EXPECT_FALSE(event.scene().full());
+  EXPECT_EQ(event.scene().revision(), 3u);
+  ASSERT_EQ(event.scene().upserted_size(), 1);
+  EXPECT_EQ(event.scene().upserted(0).id(), "c");
+  EXPECT_EQ(event.scene().upserted(0).parent_from_object().translation_m().x(), 0.5);
+  publish(4, {crate});
+  ASSERT_TRUE(subscription.Next(0, event));
+  EXPECT_EQ(event.scene().upserted_size(), 0);
+  ASSERT_EQ(event.scene().removed_ids_size(), 1);
+  EXPECT_EQ(event.scene().removed_ids(0), "r");
+  EXPECT_FALSE(subscription.Next(0, event));
+}
+
 TEST(Subscription, WhilePausedNoPictureLeavesAndThenAKeyFrameIsFirst) {
   Subscription subscription(Topics({v1::TOPIC_VIDEO, v1::TOPIC_PICTURE_PAUSE}));
   const auto paused = std::make_shared<const PicturePause>(PicturePause{true, "Ann", 5});

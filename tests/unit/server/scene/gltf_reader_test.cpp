@@ -1,4 +1,4 @@
-#include "server/scene/gltf_reader.hpp"
+#include "shared/models/gltf_reader.hpp"
 
 #include <absl/strings/match.h>
 #include <gmock/gmock.h>

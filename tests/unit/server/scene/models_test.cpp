@@ -9,7 +9,7 @@
 
 #include "server/scene/placement.hpp"
 #include "server/scene/scene_file.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 #include "tests/unit/server/scene/glb_builder.hpp"
 
 namespace saccade {

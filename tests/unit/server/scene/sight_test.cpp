@@ -8,7 +8,7 @@
 
 #include "server/scene/light_fit.hpp"
 #include "server/scene/overlay_things.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/eval/scene/placement_judge.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/scene/gltf_reader.hpp"
+#include "shared/models/gltf_reader.hpp"
 
 #include <absl/strings/str_cat.h>
 #include <tiny_gltf.h>
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <exception>
 
-#include "server/scene/gltf_preflight.hpp"
+#include "shared/models/gltf_preflight.hpp"
 
 namespace saccade {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 #include <absl/strings/str_cat.h>
 

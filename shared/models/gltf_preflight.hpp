@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "server/scene/gltf_reader.hpp"
+#include "shared/models/gltf_reader.hpp"
 
 namespace saccade {
 

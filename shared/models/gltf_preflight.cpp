@@ -1,4 +1,4 @@
-#include "server/scene/gltf_preflight.hpp"
+#include "shared/models/gltf_preflight.hpp"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <memory>
+
+#include "saccade/v1/scene.pb.h"
+#include "shared/scene/scene_object.hpp"
+
+namespace saccade {
+
+/// What one stream was told of the scene. Costs a pointer: scenes are shared. Not thread safe.
+class SceneReader {
+ public:
+  /// Fills `event` with what `scene` (never null) has that the last one had not; all of it the
+  /// first time. False: nothing that was not told.
+  bool Next(const std::shared_ptr<const Scene>& scene, v1::SceneEvent& event);
+
+ private:
+  std::shared_ptr<const Scene> told_;  // null: nothing yet
+};
+
+}  // namespace saccade

@@ -1,0 +1,60 @@
+import { add, dot, scale, subtract, type Vec3 } from '../geometry/vec3';
+import { eyeOf, rayOf } from '../geometry/view';
+import { DEFAULT_SIZE_M } from '../session/edits';
+import type { Thing } from '../session/scene_book';
+import type { Session } from '../session/session';
+import { newUuid } from '../session/uuid';
+import { DOWN, wayBetween } from '../tools/thing_places';
+import type { Aim } from './aim';
+import type { AppState, PaneName } from './app_state';
+import type { Drag } from './drag';
+
+/** Pulls a thing the way it is to be pushed along the floor; a line says which. */
+export class ThingDrag implements Drag {
+  readonly clicks = true;
+  private readonly pendingId = newUuid();
+  private way: Vec3 | undefined;
+
+  constructor(
+    private readonly session: Session,
+    private readonly state: AppState,
+    private readonly aim: Aim,
+    private readonly pane: PaneName,
+    private readonly thing: Thing,
+    private readonly push: (way: Vec3) => void,
+  ) {}
+
+  move(x: number, y: number): void {
+    const from = this.thing.parentFromObject.translation;
+    const to = this.onFloor(x, y, from);
+    this.way = to && wayBetween(from, to);
+    if (!to) return;
+    this.session.annotations.addPending({
+      ...{ requestId: this.pendingId, shape: 'measure', text: '', sizeM: DEFAULT_SIZE_M },
+      ...{ colorRgba: this.state.colorRgba, pointInWorld: from },
+      inkOffsetsM: [subtract(to, from)],
+    });
+  }
+
+  /** Under the pointer, as high as the thing's base. */
+  private onFloor(x: number, y: number, base: Vec3): Vec3 | undefined {
+    const view = this.aim.view(this.pane);
+    const direction = view && rayOf(view, this.aim.pixelNear(this.pane, x, y));
+    if (!view || !direction) return undefined;
+    const along = dot(direction, DOWN);
+    const t = dot(subtract(base, eyeOf(view)), DOWN) / along;
+    return Math.abs(along) > 1e-3 && t > 0 ? add(eyeOf(view), scale(direction, t)) : undefined;
+  }
+
+  end(x: number, y: number): void {
+    this.move(x, y);
+    const { way } = this;
+    this.cancel();
+    if (way) this.push(way);
+    else this.state.refuse(this.pane, 'Not pushed: drag it along the floor, the way it is to go.');
+  }
+
+  cancel(): void {
+    this.session.annotations.removePending(this.pendingId);
+  }
+}
