@@ -10,6 +10,7 @@ export default defineConfig({
     rollupOptions: {
       input: {
         index: fileURLToPath(new URL('index.html', import.meta.url)),
+        calibrate: fileURLToPath(new URL('calibrate.html', import.meta.url)),
         wear: fileURLToPath(new URL('wear.html', import.meta.url)),
         wearer: fileURLToPath(new URL('wearer.html', import.meta.url)),
       },

@@ -95,8 +95,8 @@ struct Options {
   bool pause = false;         // pause-picture
   double gaze_s = 0;          // fixate, home: end after this time; 0: see --help
   struct Record {
-    std::string source, frames, seconds, camera;  // as typed; saccade-eval checks them
-    std::string board, square, lens;              // calibrate-camera
+    std::string source, frames, seconds, camera;    // as typed; saccade-eval checks them
+    std::string target, board, square, lens, form;  // calibrate-camera
   } record;
   struct Markers {
     std::string family, ids, size, paper;  // print; as typed

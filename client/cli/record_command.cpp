@@ -71,16 +71,23 @@ void AddMachine(CLI::App& app, Options& options) {
   record->add_option("--camera", options.record.camera, "camera.yaml instead of the source's own");
   CLI::App* calibrate = app.add_subcommand(
       "calibrate-camera",
-      "Find a camera's lens from a chessboard that you move before it; needs no server");
+      "Find a camera's lens from a target that you move before it; needs no server");
   calibrate
       ->add_option("--source", options.record.source,
                    "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?...]")
       ->required();
-  calibrate->add_option("--board", options.record.board, "Inner corners along both sides: 9x6")
-      ->required();
-  calibrate->add_option("--square", options.record.square, "Side of one square [m]: 0.025")
-      ->required();
-  calibrate->add_option("--out", options.out, "The camera.yaml to write, a new file")->required();
+  CLI::Option* target = calibrate->add_option(
+      "--target", options.record.target,
+      "chessboard:9x6:0.025, charuco:7x5:0.04:0.03[:FAMILY], aprilgrid:6x6:0.088:0.3, "
+      "aprilgrid:FILE.yaml or arucogrid:5x7:0.04:0.01[:FAMILY]");
+  CLI::Option* square =
+      calibrate->add_option("--square", options.record.square, "Side of one square [m]: 0.025");
+  CLI::Option* board = calibrate->add_option("--board", options.record.board,
+                                             "Instead of a target: inner corners, 9x6");
+  board->needs(square)->excludes(target);
+  calibrate->add_option("--form", options.record.form,
+                        "Of the file: saccade (the default), kalibr, ros or opencv");
+  calibrate->add_option("--out", options.out, "The file to write, a new one")->required();
   calibrate->add_option("--lens", options.record.lens,
                         "brown_conrady (the default), or kannala_brandt for fisheyes");
   calibrate->add_option("--frames", options.record.frames,
@@ -101,10 +108,13 @@ absl::Status RunRecord(const Options& options) {
 }
 
 absl::Status RunCalibrateCamera(const Options& options) {
-  std::vector<std::string> words = {
-      "calibrate-camera",   "--source", options.record.source, "--out", options.out, "--board",
-      options.record.board, "--square", options.record.square};
-  AddGiven({{"--lens", options.record.lens},
+  std::vector<std::string> words = {"calibrate-camera", "--source", options.record.source, "--out",
+                                    options.out};
+  AddGiven({{"--target", options.record.target},
+            {"--board", options.record.board},
+            {"--square", options.record.square},
+            {"--form", options.record.form},
+            {"--lens", options.record.lens},
             {"--frames", options.record.frames},
             {"--for", options.record.seconds}},
            words);

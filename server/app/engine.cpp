@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/app/memory.hpp"
+#include "server/calibrate/calibration_desk.hpp"
 #include "server/capture/gap.hpp"
 #include "shared/io/log.hpp"
 
@@ -113,6 +114,7 @@ void Engine::Stop() {
   for (std::jthread* thread : {&source_thread_, &tracker_thread_, &clock_thread_}) {
     thread->request_stop();
   }
+  if (options_.calibration) options_.calibration->Stop();
   pictures_->Stop();
   scene_->Stop();
   source_->Stop();           // its next frame may not be due for long
@@ -183,6 +185,7 @@ void Engine::Track(Frame frame) {
   tracked.stages.received_ns = step.frame->received_time_ns;
   scene_layer_.SetLight(wearable_->tracker().light());
   last_ = std::move(next);
+  if (options_.calibration) options_.calibration->OnFrame(step.frame);
   for (const AnchorMoved& moved : step.moved) {
     Log(absl::StrFormat("anchor %s moved %.1f mm: %s", moved.id, 1e3 * moved.delta_in_world.norm(),
                         moved.cause));

@@ -26,6 +26,8 @@
 
 namespace saccade {
 
+class CalibrationDesk;
+
 struct EngineOptions {
   std::string version;
   bool every_frame = false;      // --speed max: the source waits for the tracker, nothing dropped
@@ -38,8 +40,9 @@ struct EngineOptions {
   /// the camera itself is fixed.
   std::optional<CameraIntrinsics> crop;
   GazeOptions gaze;
-  std::shared_ptr<PictureSwitch> pictures;  // null: one that keeps nothing
-  std::shared_ptr<SceneKeeper> scene;       // likewise
+  std::shared_ptr<PictureSwitch> pictures;       // null: one that keeps nothing
+  std::shared_ptr<SceneKeeper> scene;            // likewise
+  std::shared_ptr<CalibrationDesk> calibration;  // null: nobody calibrates the camera
   GlBackend gl = GlBackend::kOsmesa;
 };
 

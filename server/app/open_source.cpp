@@ -1,10 +1,40 @@
 #include "server/app/open_source.hpp"
 
+#include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <cstdint>
+
 #include "server/capture/source.hpp"
 #include "server/mount/drivers/drivers.hpp"
 #include "server/sim/sim_source.hpp"
+#include "shared/io/log.hpp"
+#include "shared/io/regular_file.hpp"
 
 namespace saccade {
+namespace {
+
+constexpr std::size_t kLongestName = 80;
+
+/// Fowler, Noll and Vo's hash, the same on every machine.
+std::uint32_t Fnv1a(absl::string_view text) {
+  std::uint32_t hash = 2166136261U;
+  for (const char each : text) hash = (hash ^ static_cast<unsigned char>(each)) * 16777619U;
+  return hash;
+}
+
+}  // namespace
+
+std::filesystem::path KeptCameraFile(const ServerConfig& config) {
+  if (config.data_dir.empty() || absl::StartsWith(config.source, "phone:")) return {};
+  // Sources that differ in one character only do not meet in one file.
+  std::string name;
+  for (const char each : config.source) name += absl::ascii_isalnum(each) ? each : '-';
+  if (name.size() > kLongestName) name.resize(kLongestName);
+  return config.data_dir / "cameras" / absl::StrFormat("%s-%08x.yaml", name, Fnv1a(config.source));
+}
 
 absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config) {
   SimSource* sim = nullptr;
@@ -31,6 +61,13 @@ absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config) {
   SourceOptions options;
   options.realtime = !config.every_frame;
   options.camera_file = config.camera_file;
+  const std::filesystem::path kept = KeptCameraFile(config);
+  if (options.camera_file.empty() && !kept.empty() && MayExist(kept)) {
+    options.camera_file = kept;
+    Log(absl::StrCat("camera ", kept.string(),
+                     " is used, which a calibration made; remove it to go without, or give another "
+                     "with --camera"));
+  }
   absl::StatusOr<std::unique_ptr<FrameSource>> source = sources.Open(config.source, options);
   if (!source.ok()) return source.status();
   absl::StatusOr<OpenedMount> mount = MountDrivers().Open(

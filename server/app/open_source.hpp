@@ -2,6 +2,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <filesystem>
 #include <memory>
 
 #include "server/app/server_config.hpp"
@@ -17,6 +18,10 @@ struct OpenedSource {
   OpenedMount mount;
   PhoneSource* phone = nullptr;  // the source, where that is a phone
 };
+
+/// Where the camera file of this source is kept that a calibration made (docs/calibration.md);
+/// empty: nowhere, as a phone's is another with every phone.
+std::filesystem::path KeptCameraFile(const ServerConfig& config);
 
 /// The source and the mount that the configuration names, of every scheme this program links.
 absl::StatusOr<OpenedSource> OpenConfiguredSource(const ServerConfig& config);

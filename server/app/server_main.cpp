@@ -18,6 +18,7 @@
 #include "server/app/shutdown.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/audio/wearer_voice.hpp"
+#include "server/calibrate/calibration_desk.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/pipeline/descriptors.hpp"
 #include "server/rpc/rpc_server.hpp"
@@ -57,8 +58,15 @@ absl::Status CheckVideo(const ServerConfig& config, const OpenedSource& opened) 
   return absl::OkStatus();
 }
 
+/// Without the password that an address may hold.
+std::string NameForReports(const std::string& source) {
+  return source.find('@') == std::string::npos ? source : source.substr(0, source.find(':'));
+}
+
 absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, EventSink& sink,
-                                                   PhoneSource*& phone, Shutdown& shutdown) {
+                                                   PhoneSource*& phone,
+                                                   std::shared_ptr<CalibrationDesk>& calibration,
+                                                   Shutdown& shutdown) {
   shutdown.SetPhase("opening the source");
   absl::StatusOr<OpenedSource> opened = OpenConfiguredSource(config);
   if (!opened.ok()) return opened.status();
@@ -98,6 +106,10 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, E
   absl::StatusOr<std::unique_ptr<SceneKeeper>> scene = SceneKeeper::Open(config.data_dir);
   if (!scene.ok()) return scene.status();
   options.scene = *std::move(scene);
+  calibration = std::make_shared<CalibrationDesk>(CalibrationDesk::Options{
+      NameForReports(config.source), KeptCameraFile(config),
+      [pictures = options.pictures](FrameId id) { return pictures->MayShow(id).ok(); }});
+  options.calibration = calibration;
   options.gl = config.gl;
   options.overlay.features = config.overlay_dots;
   options.overlay.world_axes = config.overlay_axes;
@@ -176,7 +188,9 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   StreamHub hub;
   WearerTee tee(hub);
   PhoneSource* phone = nullptr;
-  absl::StatusOr<std::unique_ptr<Engine>> engine = MakeEngine(config, tee, phone, shutdown);
+  std::shared_ptr<CalibrationDesk> calibration;
+  absl::StatusOr<std::unique_ptr<Engine>> engine =
+      MakeEngine(config, tee, phone, calibration, shutdown);
   if (!engine.ok()) return engine.status();
   const absl::Cleanup no_commit = [&shutdown] { shutdown.SetCommit(nullptr); };
   shutdown.SetCommit(
@@ -185,6 +199,7 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   RpcServerOptions rpc_options;
   rpc_options.host = config.grpc.host;
   rpc_options.port = config.grpc.port;
+  rpc_options.calibration = calibration.get();
   ApplyLimits(config, rpc_options);
   shutdown.SetPhase("making certificates");
   const absl::StatusOr<std::unique_ptr<FrontDoor>> door = FrontDoor::Open(config);

@@ -21,6 +21,8 @@ Written LensOf(LensModel model) {
       return {"brown_conrady", 5};
     case LensModel::kKannalaBrandt:
       return {"kannala_brandt", 4};
+    case LensModel::kFov:
+      return {"fov", 1};
     default:
       return {"pinhole", 0};
   }

@@ -50,9 +50,11 @@ struct RenderArguments {
 };
 struct CalibrateArguments {
   std::string source, frames;
-  std::string board;                   // 9x6: inner corners
+  std::string target;                  // MakeLensTarget's; or...
+  std::string board;                   // ...9x6: inner corners
   double square_m = 0;                 // side of one square
   std::string lens = "brown_conrady";  // or kannala_brandt
+  std::string form = "saccade";        // or kalibr, ros, opencv
   std::filesystem::path out;
   double seconds = 0;  // end after so long; 0: with the source, or when nothing is missing
   bool json = false;
@@ -78,9 +80,10 @@ struct CalibrateTargetArguments {
   std::filesystem::path images;  // a folder of pictures, or...
   std::string source, frames;    // ...a source, A:B of it
   double seconds = 0;            // of the source; 0: to its end
-  std::string target;   // chessboard:9x6:0.04, charuco:7x5:0.04:0.03, aprilgrid:6x6:0.088:0.3
-  std::string lens;     // empty: the one that explains more
-  int border_bits = 0;  // as above
+  std::string target;  // chessboard:9x6:0.04, charuco:7x5:0.04:0.03, aprilgrid:6x6:0.088:0.3
+  std::string lens;    // empty: the one that explains more
+  std::string form = "saccade";  // or kalibr, ros, opencv
+  int border_bits = 0;           // as above
   std::filesystem::path out;
   bool json = false;
 };
@@ -107,7 +110,7 @@ absl::Status RenderCommand(const RenderArguments& arguments);
 absl::Status RecordSimulator(const RenderArguments& arguments);
 /// Writes any source as a recording in TUM layout (RecordSource), a simulated one with its truth.
 absl::Status RecordCommand(const RenderArguments& arguments);
-/// Finds a camera's lens from a source that shows a chessboard and writes it as camera.yaml, with
+/// Finds a camera's lens from a source that shows a target and writes it as camera.yaml, with
 /// sigmas; refuses where the views do not determine it.
 absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments);
 /// Finds square markers in the pictures of a folder; DIR/detections.csv: file, family, id, four

@@ -159,18 +159,36 @@ void AddRecord(CLI::App& app, RenderArguments& arguments) {
       ->check(Finite());
 }
 
+constexpr char kLiveTargets[] =
+    "chessboard:9x6:0.025 (inner corners, side of a square in metres), "
+    "charuco:7x5:0.04:0.03[:aruco_4x4_50] (squares, sides of a square and of a marker), "
+    "aprilgrid:6x6:0.088:0.3 (tags, side of a tag, gap as a share of it), aprilgrid:FILE.yaml or "
+    "arucogrid:5x7:0.04:0.01[:aruco_4x4_50] (markers, side of one, gap in metres)";
+
+void AddForm(CLI::App& calibrate, std::string& form) {
+  calibrate
+      .add_option("--form", form,
+                  "Of the file: saccade (camera.yaml), kalibr (camchain.yaml; without k3), ros "
+                  "(camera_info) or opencv (FileStorage)")
+      ->check(CLI::IsMember({"saccade", "kalibr", "ros", "opencv"}))
+      ->capture_default_str();
+}
+
 void AddCalibrateCamera(CLI::App& app, CalibrateArguments& arguments) {
   CLI::App* calibrate = app.add_subcommand(
-      "calibrate-camera", "Find a camera's lens from a chessboard that is moved before it");
+      "calibrate-camera", "Find a camera's lens from a target that is moved before it");
   calibrate
       ->add_option("--source", arguments.source,
                    "v4l2:DEVICE, file:VIDEO, rtsp://..., dataset:DIR or sim:desk[?key=value&...]")
       ->required();
-  calibrate->add_option("--board", arguments.board, "Inner corners along both sides: 9x6")
-      ->required();
-  calibrate->add_option("--square", arguments.square_m, "Side of one square [m]: 0.025")
-      ->required();
-  calibrate->add_option("--out", arguments.out, "The camera.yaml to write, a new file")->required();
+  CLI::Option* target = calibrate->add_option("--target", arguments.target, kLiveTargets);
+  CLI::Option* square =
+      calibrate->add_option("--square", arguments.square_m, "Side of one square [m]: 0.025");
+  calibrate->add_option("--board", arguments.board, "Instead of a target: inner corners, 9x6")
+      ->needs(square)
+      ->excludes(target);
+  calibrate->add_option("--out", arguments.out, "The file to write, a new one")->required();
+  AddForm(*calibrate, arguments.form);
   calibrate->add_option("--lens", arguments.lens, "kannala_brandt for fisheyes, else brown_conrady")
       ->check(CLI::IsMember({"brown_conrady", "kannala_brandt"}))
       ->capture_default_str();
@@ -200,7 +218,8 @@ void AddCalibrateTarget(CLI::App& app, CalibrateTargetArguments& arguments) {
   calibrate->add_option("--target", arguments.target,
                         "chessboard:9x6:0.04 (inner corners, side of a square in metres), "
                         "charuco:7x5:0.04:0.03[:aruco_4x4_50] (squares, sides of a square and of a "
-                        "marker), aprilgrid:6x6:0.088:0.3, aprilgrid:FILE.yaml or walls:FILE.yaml "
+                        "marker), aprilgrid:6x6:0.088:0.3, aprilgrid:FILE.yaml, "
+                        "arucogrid:5x7:0.04:0.01[:aruco_4x4_50] or walls:FILE.yaml "
                         "(squares of known places on two walls, one view is enough); else the "
                         "folder's aprilgrid.yaml");
   calibrate
@@ -211,7 +230,8 @@ void AddCalibrateTarget(CLI::App& app, CalibrateTargetArguments& arguments) {
       ->add_option("--border-bits", arguments.border_bits,
                    "Width of a tag's black border in cells; else what reads more")
       ->check(CLI::Range(1, 4));
-  calibrate->add_option("--out", arguments.out, "The camera.yaml to write, a new file")->required();
+  calibrate->add_option("--out", arguments.out, "The file to write, a new one")->required();
+  AddForm(*calibrate, arguments.form);
   calibrate->add_flag("--json", arguments.json, "Print the report as JSON");
 }
 

@@ -46,6 +46,13 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"SceneService/UploadModel", kAnnotator},
     {"SceneService/RegisterObject", kAnnotator},
 
+    {"CalibrationService/GetCalibration", kViewer},
+    {"CalibrationService/GetCalibrationFile", kViewer},
+    {"CalibrationService/StartCalibration", kPilot},
+    {"CalibrationService/FinishCalibration", kPilot},
+    {"CalibrationService/StopCalibration", kPilot},
+    {"CalibrationService/SaveCalibration", kWearer},  // whose camera it is
+
     {"TalkService/ListMessages", kViewer},
     {"TalkService/Say", kAnnotator},
     {"TalkService/Speak", kAnnotator},

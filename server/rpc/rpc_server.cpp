@@ -7,6 +7,7 @@
 
 #include "server/rpc/access_service.hpp"
 #include "server/rpc/annotation_service.hpp"
+#include "server/rpc/calibration_service.hpp"
 #include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/gaze_service.hpp"
 #include "server/rpc/grpc_listener.hpp"
@@ -102,6 +103,7 @@ class RpcServer::Impl {
         gaze_service_(backend, gate_),
         pointer_service_(backend, pointers_, gate_),
         scene_service_(backend, gate_),
+        calibration_service_(options.calibration, gate_),
         talk_service_(backend, hub, gate_, options.limits.voice_packets) {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
@@ -150,6 +152,7 @@ class RpcServer::Impl {
     builder.RegisterService(&gaze_service_);
     builder.RegisterService(&pointer_service_);
     builder.RegisterService(&scene_service_);
+    builder.RegisterService(&calibration_service_);
     builder.RegisterService(&talk_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
@@ -197,6 +200,7 @@ class RpcServer::Impl {
   GazeService gaze_service_;
   PointerService pointer_service_;
   SceneService scene_service_;
+  CalibrationService calibration_service_;
   TalkService talk_service_;
   std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
   std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs

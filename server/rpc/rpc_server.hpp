@@ -10,6 +10,7 @@
 
 #include "server/identity/access_book.hpp"
 #include "server/identity/identity_provider.hpp"
+#include "server/pipeline/calibration.hpp"
 #include "server/pipeline/connection_limits.hpp"
 #include "server/rpc/admission.hpp"
 #include "server/rpc/backend.hpp"
@@ -57,6 +58,8 @@ struct RpcServerOptions {
   AccessBook* access = nullptr;
   /// With whom people sign in; outlives the server, which stops it. Null: nobody does.
   IdentityProvider* provider = nullptr;
+  /// Who calibrates the camera; outlives the server. Null: nobody.
+  CalibrationPort* calibration = nullptr;
   /// What a browser opens with an invite. Any thread.
   std::function<std::string(AccessRole, const std::string& token)> make_link;
   bool insecure = false;  // plain beyond loopback: told to every page

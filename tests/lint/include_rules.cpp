@@ -15,14 +15,15 @@ using std::string_view;
 
 // Listed along the data flow: a folder includes only itself and those before it.
 constexpr auto kServerOrder = std::to_array<string_view>(
-    {"pipeline", "mount",   "gl",     "capture", "sim",      "scene",   "features",
-     "markers",  "filter",  "map",    "team",    "tracker",  "anchors", "gaze",
-     "wearable", "overlay", "encode", "store",   "identity", "rpc",     "wear",
-     "audio",    "gateway", "eval",   "app"});
+    {"pipeline", "mount",     "gl",      "capture", "sim",   "scene",    "features",
+     "markers",  "calibrate", "filter",  "map",     "team",  "tracker",  "anchors",
+     "gaze",     "wearable",  "overlay", "encode",  "store", "identity", "rpc",
+     "wear",     "audio",     "gateway", "eval",    "app"});
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "talk", "decode", "tools", "view", "cli", "app"});
-constexpr auto kSharedOrder = std::to_array<string_view>(
-    {"version", "io", "geometry", "time", "audio", "camera", "scene", "models", "marks", "wire", "render"});
+constexpr auto kSharedOrder =
+    std::to_array<string_view>({"version", "io", "geometry", "time", "audio", "camera", "scene",
+                                "models", "marks", "wire", "render"});
 
 // Folders that see less than what is above them: only snapshots, packets and commands.
 struct Restriction {

@@ -4,10 +4,10 @@
 #include <iostream>
 #include <map>
 
+#include "server/calibrate/grid_pictures.hpp"
+#include "server/calibrate/picture_folder.hpp"
 #include "server/capture/image_file.hpp"
-#include "server/eval/calibrate/grid_pictures.hpp"
 #include "server/eval/commands.hpp"
-#include "server/eval/markers/picture_folder.hpp"
 #include "server/eval/markers/sighting_csv.hpp"
 #include "server/eval/output_file.hpp"
 #include "server/markers/marker_detector.hpp"

@@ -54,8 +54,8 @@ TEST(CalibrateCameraCommand, FindsTheLensOfOpenCvsPicturesAndWritesItForTheServe
   EXPECT_LT(fx["sigma"].get<double>(), 5.0);
   EXPECT_LT(report["rms_px"].get<double>(), 0.3);
   EXPECT_THAT(run.err, HasSubstr("\"next\":"));
-  EXPECT_THAT(Read(out), AllOf(HasSubstr("# Made by saccade calibrate-camera"),
-                               HasSubstr("# one sigma: fx"), HasSubstr("model: brown_conrady")));
+  EXPECT_THAT(Read(out), AllOf(HasSubstr("# Made by saccade "), HasSubstr("# one sigma: fx"),
+                               HasSubstr("model: brown_conrady")));
   // It is a camera file of ours.
   const RunResult again = RunProgram(
       {SACCADE_PROGRAM, "record", "--source", source, "--camera", out, "--out", results / "set"});

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "saccade/v1/annotation.pb.h"
+#include "saccade/v1/calibration.pb.h"
 #include "saccade/v1/gaze.pb.h"
 #include "saccade/v1/map.pb.h"
 #include "saccade/v1/pointer.pb.h"
@@ -69,6 +70,14 @@ const std::map<std::string, Least>& Promised() {
                                                     {"AnnotationService/TickCheckItem", kAnnotator},
                                                     {"AnnotationService/GetPicture", kViewer},
                                                     {"PointerService/Point", kAnnotator},
+                                                    {"CalibrationService/GetCalibration", kViewer},
+                                                    {"CalibrationService/GetCalibrationFile",
+                                                     kViewer},
+                                                    {"CalibrationService/StartCalibration", kPilot},
+                                                    {"CalibrationService/FinishCalibration",
+                                                     kPilot},
+                                                    {"CalibrationService/StopCalibration", kPilot},
+                                                    {"CalibrationService/SaveCalibration", kWearer},
                                                     {"MapService/Get", kViewer},
                                                     {"MapService/Export", kViewer},
                                                     {"MapService/List", kViewer},
@@ -97,7 +106,8 @@ std::vector<const MethodDescriptor*> EveryMethod() {
        {v1::GetAccessRequest::descriptor(), v1::JoinRequest::descriptor(),
         v1::ListAnnotationsRequest::descriptor(), v1::GetMapRequest::descriptor(),
         v1::GetGazeStateRequest::descriptor(), v1::PointRequest::descriptor(),
-        v1::WearerHello::descriptor(), v1::ListSceneRequest::descriptor()}) {
+        v1::WearerHello::descriptor(), v1::ListSceneRequest::descriptor(),
+        v1::GetCalibrationRequest::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

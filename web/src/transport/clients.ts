@@ -2,6 +2,7 @@ import { type Client, createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { bearing } from './access';
 import { AnnotationService } from '../gen/saccade/v1/annotation_pb';
+import { CalibrationService } from '../gen/saccade/v1/calibration_pb';
 import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
 import { PointerService } from '../gen/saccade/v1/pointer_pb';
@@ -12,6 +13,7 @@ import { TalkService } from '../gen/saccade/v1/talk_pb';
 export interface Clients {
   readonly session: Client<typeof SessionService>;
   readonly annotations: Client<typeof AnnotationService>;
+  readonly calibration: Client<typeof CalibrationService>;
   readonly map: Client<typeof MapService>;
   readonly gaze: Client<typeof GazeService>;
   readonly pointers: Client<typeof PointerService>;
@@ -26,6 +28,7 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
   return {
     session: createClient(SessionService, transport),
     annotations: createClient(AnnotationService, transport),
+    calibration: createClient(CalibrationService, transport),
     map: createClient(MapService, transport),
     gaze: createClient(GazeService, transport),
     pointers: createClient(PointerService, transport),

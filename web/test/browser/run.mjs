@@ -8,7 +8,7 @@
 // what they draw, point at and change. keys: everything without a mouse. shapes: marks by their pixels, page
 // against server. wear: a phone as the camera, and an expert, each in a network of its own. waiting: who comes
 // waits to be let in. talk: voices, messages, the pause of the picture, the first task. oidc: a firm's people sign
-// in. By hand alone: clicks (over a late network), shots (pictures at seven sizes, light and dark).
+// in. calibrate: a lens from pictures of a board. By hand alone: clicks (over a late network), shots (pictures at seven sizes, light and dark).
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -59,6 +59,7 @@ const PARTS = {
   keys: async () => (await import('./keyboard.mjs')).runKeyboard,
   shots: async () => (await import('./shots.mjs')).runShots,
   things: async () => (await import('./things.mjs')).runThings,
+  calibrate: async () => (await import('./calibrate.mjs')).runCalibrate,
   oidc: async () => (await import('./oidc.mjs')).runOidc,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);

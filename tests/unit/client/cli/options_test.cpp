@@ -153,6 +153,27 @@ TEST(CommandLine, CalibrateMountTakesAFileOrNone) {
   EXPECT_EQ(Parse({"calibrate-mount", "now"}).exit_code, kBadUsage);
 }
 
+TEST(CommandLine, CalibrateCameraTakesATargetOrABoardWithItsSquare) {
+  const ParseResult target = Parse({"calibrate-camera", "--source", "v4l2:/dev/video0", "--target",
+                                    "charuco:7x5:0.04:0.03", "--form", "ros", "--out", "a.yaml"});
+  ASSERT_TRUE(target.options);
+  EXPECT_EQ(target.options->command, Command::kCalibrateCamera);
+  EXPECT_EQ(target.options->record.target, "charuco:7x5:0.04:0.03");
+  EXPECT_EQ(target.options->record.form, "ros");
+  const std::vector<const char*> plain = {"calibrate-camera", "--source", "v4l2:/dev/video0",
+                                          "--out", "a.yaml"};
+  const auto with = [&](const std::vector<const char*>& more) {
+    std::vector<const char*> words = plain;
+    words.insert(words.end(), more.begin(), more.end());
+    return Parse(words);
+  };
+  EXPECT_TRUE(with({"--board", "9x6", "--square", "0.025"}).options);
+  EXPECT_EQ(with({"--board", "9x6"}).exit_code, kBadUsage);
+  EXPECT_EQ(
+      with({"--board", "9x6", "--square", "0.025", "--target", "chessboard:9x6:0.025"}).exit_code,
+      kBadUsage);
+}
+
 TEST(CommandLine, AnnotationsMeansListUnlessToldOtherwise) {
   EXPECT_EQ(Parse({"annotations"}).options->command, Command::kListAnnotations);
   EXPECT_EQ(Parse({"annotations", "list"}).options->command, Command::kListAnnotations);

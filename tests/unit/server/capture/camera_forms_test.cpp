@@ -1,8 +1,11 @@
 // Camera files of other programs: the forms of their public examples, rewritten by hand.
 #include <gmock/gmock.h>
 
+#include <opencv2/core.hpp>
+
 #include "server/capture/camera_file.hpp"
 #include "server/capture/camera_files/camera_draft.hpp"
+#include "server/capture/camera_text.hpp"
 #include "server/capture/dataset.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
@@ -459,6 +462,90 @@ TEST_F(CameraForms, ADataSetRunsOnACameraFileWithoutASize) {
   ASSERT_TRUE(source.ok()) << source.status();
   EXPECT_EQ((*source)->info().camera->width(), kWidth);
   EXPECT_EQ((*source)->info().camera->intrinsics().fx, 60);
+}
+
+CameraIntrinsics Calibrated(LensModel model, std::array<double, 5> distortion) {
+  CameraIntrinsics lens;
+  lens.model = model;
+  lens.width = 752, lens.height = 480;
+  lens.fx = 458.654321098765, lens.fy = 457.2961111111111;
+  lens.cx = 367.21500000000003, lens.cy = 248.375;
+  lens.distortion = distortion;
+  return lens;
+}
+
+constexpr std::array<double, 5> kBrown = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05,
+                                          0.01};
+constexpr std::array<double, 5> kBrownWithoutK3 = {-0.28340811, 0.07395907, 0.00019359, 1.7e-05, 0};
+constexpr std::array<double, 5> kFish = {-0.0133, -0.0024, 0.0021, -0.0012, 0};
+
+TEST_F(CameraForms, WhatIsWrittenInAnyFormIsReadBackToTheSameNumbers) {
+  using Form = CameraTextForm;
+  const auto expect = [&](Form form, LensModel model, const std::array<double, 5>& distortion,
+                          LensModel read_as) {
+    const CameraIntrinsics lens = Calibrated(model, distortion);
+    const auto text = CameraText(form, lens, "Made by a test\n# one sigma: fx 0.1");
+    ASSERT_TRUE(text.ok()) << text.status();
+    SCOPED_TRACE(*text);
+    EXPECT_THAT(*text, HasSubstr("one sigma: fx 0.1"));
+    Expect(Read(*text), read_as, lens.width, lens.height, {lens.fx, lens.fy, lens.cx, lens.cy},
+           distortion);
+  };
+  for (const char* name : {"saccade", "kalibr", "ros", "opencv"}) {
+    const auto form = ParseCameraTextForm(name);
+    ASSERT_TRUE(form.ok());
+    const bool kalibr = *form == Form::kKalibr, own = *form == Form::kSaccade;
+    expect(*form, LensModel::kBrownConrady, kalibr ? kBrownWithoutK3 : kBrown,
+           LensModel::kBrownConrady);
+    expect(*form, LensModel::kKannalaBrandt, kFish, LensModel::kKannalaBrandt);
+    // ROS and OpenCV say a pinhole by coefficients of zero.
+    expect(*form, LensModel::kPinhole, {},
+           own || kalibr ? LensModel::kPinhole : LensModel::kBrownConrady);
+    if (own || kalibr) expect(*form, LensModel::kFov, {0.9213, 0, 0, 0, 0}, LensModel::kFov);
+  }
+  EXPECT_THAT(std::string(ParseCameraTextForm("colmap").status().message()),
+              HasSubstr("give saccade, kalibr, ros or opencv"));
+}
+
+TEST_F(CameraForms, OpenCvReadsWhatIsWrittenForIt) {
+  for (const LensModel model : {LensModel::kBrownConrady, LensModel::kKannalaBrandt}) {
+    const bool fisheye = model == LensModel::kKannalaBrandt;
+    const CameraIntrinsics lens = Calibrated(model, fisheye ? kFish : kBrown);
+    const auto text = CameraText(CameraTextForm::kOpenCv, lens, "Made by a test");
+    ASSERT_TRUE(text.ok());
+    cv::FileStorage storage(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    cv::Mat matrix, coefficients;
+    storage["camera_matrix"] >> matrix;
+    storage["distortion_coefficients"] >> coefficients;
+    ASSERT_EQ(matrix.size(), cv::Size(3, 3));
+    EXPECT_EQ(matrix.at<double>(0, 0), lens.fx);
+    EXPECT_EQ(matrix.at<double>(1, 2), lens.cy);
+    ASSERT_EQ(coefficients.total(), fisheye ? 4 : 5);
+    EXPECT_EQ(coefficients.at<double>(3), lens.distortion[3]);
+    EXPECT_EQ(static_cast<int>(storage["image_width"]), lens.width);
+  }
+}
+
+TEST_F(CameraForms, AFormThatHasNoWordsForALensSaysWhichHas) {
+  const auto error = [](CameraTextForm form, CameraIntrinsics lens) {
+    const auto text = CameraText(form, lens);
+    EXPECT_EQ(text.status().code(), absl::StatusCode::kFailedPrecondition);
+    return std::string(text.status().message());
+  };
+  EXPECT_THAT(
+      error(CameraTextForm::kKalibr, Calibrated(LensModel::kBrownConrady, kBrown)),
+      AllOf(HasSubstr("form kalibr"), HasSubstr("k3"), HasSubstr("ros, opencv or saccade")));
+  for (const auto form : {CameraTextForm::kKalibr, CameraTextForm::kRos, CameraTextForm::kOpenCv}) {
+    EXPECT_THAT(error(form, Calibrated(LensModel::kRadial1, {6e-7, 0, 0, 0, 0})),
+                AllOf(HasSubstr("radial1"), HasSubstr("the form saccade")));
+    CameraIntrinsics rolling = Calibrated(LensModel::kBrownConrady, kBrownWithoutK3);
+    rolling.rolling_shutter_readout_s = 0.02;
+    EXPECT_THAT(error(form, rolling), HasSubstr("rolling shutter"));
+  }
+  for (const auto form : {CameraTextForm::kRos, CameraTextForm::kOpenCv}) {
+    EXPECT_THAT(error(form, Calibrated(LensModel::kFov, {0.92, 0, 0, 0, 0})),
+                AllOf(HasSubstr("fov"), HasSubstr("kalibr or saccade")));
+  }
 }
 
 }  // namespace
