@@ -132,8 +132,8 @@ absl::Status GridPictures::Find(const CameraModel& camera) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<LensFit> GridPictures::Search(LensChoice choice) {
-  absl::StatusOr<LensFit> fit = FitLens(ReadViews(), size_, choice);
+absl::StatusOr<CalibratedLens> GridPictures::Search(LensChoice choice) {
+  absl::StatusOr<CalibratedLens> fit = FitLens(ReadViews(), size_, choice);
   for (int round = 0; round < kRounds && fit.ok(); ++round) {
     if (absl::Status found = Find(CameraModel(fit->lens)); !found.ok()) return found;
     fit = FitLens(Views(), size_, choice);

@@ -42,7 +42,7 @@ class GridPictures {
                                            const LeftOut& left_out);
   /// Finds a lens of `model` from what was read, with it all tags in all pictures, and a better
   /// lens from these, twice. FailedPrecondition: the tags fit no lens.
-  absl::StatusOr<LensFit> Search(LensChoice choice);
+  absl::StatusOr<CalibratedLens> Search(LensChoice choice);
 
   /// What was found, as a calibration takes it: a picture with fewer than four tags has no view.
   std::vector<BoardView> Views() const;

@@ -161,7 +161,7 @@ std::optional<Solution> Solve(const LensProblem& problem, const std::vector<Boar
 
 /// One entry for each view: how it fits, or that it was left out, and how it would have.
 void DescribeViews(const LensProblem& problem, const Solution& solution,
-                   const std::vector<BoardView>& views, LensFit& fit) {
+                   const std::vector<BoardView>& views, CalibratedLens& fit) {
   for (const BoardView& view : views) {
     fit.views.push_back(FitView(view, fit));
     fit.views.back().rejected = true;
@@ -187,8 +187,8 @@ Eigen::Vector3d ViewFit::normal() const {
   return z.z() < 0 ? Eigen::Vector3d(-z) : z;
 }
 
-absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, cv::Size picture,
-                                LensChoice choice, std::stop_token stop) {
+absl::StatusOr<CalibratedLens> FitLens(const std::vector<BoardView>& views, cv::Size picture,
+                                       LensChoice choice, std::stop_token stop) {
   if (views.size() < 3) {
     return absl::FailedPreconditionError(
         absl::StrCat("the board was seen whole in ", views.size(),
@@ -196,7 +196,7 @@ absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, cv::Size pi
   }
   const LensProblem problem(choice, std::move(stop));
   const std::optional<Solution> solution = Solve(problem, views, picture);
-  LensFit fit;
+  CalibratedLens fit;
   if (solution) {
     fit.lens = LensOf(solution->state.lens, choice.model, picture);
     fit.names = NamesOf(choice);
@@ -217,7 +217,7 @@ absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, cv::Size pi
   return fit;
 }
 
-ViewFit FitView(const BoardView& view, const LensFit& fit) {
+ViewFit FitView(const BoardView& view, const CalibratedLens& fit) {
   const LensProblem problem({fit.lens.model, fit.values.size() == 9});
   LensProblem::State state;
   state.lens = fit.values;

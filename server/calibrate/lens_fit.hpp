@@ -25,7 +25,7 @@ struct ViewFit {
 };
 
 /// A lens and what is known of it.
-struct LensFit {
+struct CalibratedLens {
   CameraIntrinsics lens;
   /// fx fy cx cy and the model's coefficients, one standard deviation each, from the residuals: the
   /// larger of what independent corners and what independent views say.
@@ -38,10 +38,10 @@ struct LensFit {
 /// Fits the chosen lens to views of the board: least squares with Huber's
 /// weights over the lens and a pose for each view; views that fit far worse than the others are
 /// left out. `stop` gives up soon. FailedPrecondition: no lens explains them; what to look at.
-absl::StatusOr<LensFit> FitLens(const std::vector<BoardView>& views, cv::Size picture,
-                                LensChoice choice, std::stop_token stop = {});
+absl::StatusOr<CalibratedLens> FitLens(const std::vector<BoardView>& views, cv::Size picture,
+                                       LensChoice choice, std::stop_token stop = {});
 
 /// The pose of the board in a view that had no part in the fit, with the lens held.
-ViewFit FitView(const BoardView& view, const LensFit& fit);
+ViewFit FitView(const BoardView& view, const CalibratedLens& fit);
 
 }  // namespace saccade

@@ -85,7 +85,7 @@ absl::StatusOr<LensReport> Calibrate(const std::string& source, const ViewPicker
     const bool hold = hold_out && k % 5 == 4 && picker.views().size() >= 10;
     (hold ? held_out : fitted).push_back(picker.views()[k]);
   }
-  absl::StatusOr<LensFit> fit = FitLens(fitted, picture, choice, std::move(stop));
+  absl::StatusOr<CalibratedLens> fit = FitLens(fitted, picture, choice, std::move(stop));
   if (!fit.ok()) return fit.status();
   report.fit = *std::move(fit);
   AddErrors(fitted, report);

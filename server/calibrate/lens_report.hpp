@@ -21,7 +21,7 @@ struct CornerError {
 struct LensReport {
   std::string source;
   std::string board;  // in words, for the file
-  LensFit fit;
+  CalibratedLens fit;
   std::vector<ViewFit> held_out;  // views that had no part in the fit
   double held_out_rms_px = 0;
   double covered = 0;               // share of the picture that corners were in

@@ -57,7 +57,7 @@ absl::StatusOr<TargetViews> FindGrid(const PictureSet& pictures, const std::stri
       GridPictures::Read(pictures, *grid, border_bits, "apriltag", SayProgress,
                          [](const absl::Status& why) { SayLeftOut(why.message()); });
   if (!read.ok()) return read.status();
-  const absl::StatusOr<LensFit> fit = read->Search(LensModel::kBrownConrady);
+  const absl::StatusOr<CalibratedLens> fit = read->Search(LensModel::kBrownConrady);
   if (!fit.ok()) return fit.status();
   return TargetViews{
       read->Views(),

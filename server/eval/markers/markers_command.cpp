@@ -108,7 +108,7 @@ absl::Status DetectGrid(const TagGrid& grid, const MarkersArguments& arguments, 
       GridPictures::Read(*set, grid, arguments.border_bits, arguments.detector, SayProgress,
                          [&](const absl::Status& why) { SayUnreadable(why, tally); });
   if (!pictures.ok()) return pictures.status();
-  const absl::StatusOr<LensFit> fit = pictures->Search(LensModel::kBrownConrady);
+  const absl::StatusOr<CalibratedLens> fit = pictures->Search(LensModel::kBrownConrady);
   if (!fit.ok()) {
     std::cerr << "the sheet was not searched for: " << fit.status().message() << "\n";
   }
