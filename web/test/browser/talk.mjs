@@ -316,7 +316,8 @@ async function pause(context) {
   const status = await ann.page.locator('header .status').innerText();
   check(
     'tracking goes on',
-    (await pose()) > before && /picture paused the map stays live/.test(status.replace(/\s+/g, ' ')),
+    (await pose()) > before &&
+      /picture paused the map stays live/.test(status.replace(/\s+/g, ' ')),
     status.replace(/\s+/g, ' '),
   );
   const words = await wim.page.locator('.paused-words').innerText();
