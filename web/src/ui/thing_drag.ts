@@ -13,6 +13,7 @@ import type { Drag } from './drag';
 export class ThingDrag implements Drag {
   readonly clicks = true;
   private readonly pendingId = newUuid();
+  private first: Vec3 | undefined; // where it was taken hold of, as high as its base
   private way: Vec3 | undefined;
 
   constructor(
@@ -26,9 +27,11 @@ export class ThingDrag implements Drag {
 
   move(x: number, y: number): void {
     const from = this.thing.parentFromObject.translation;
-    const to = this.onFloor(x, y, from);
-    this.way = to && wayBetween(from, to);
-    if (!to) return;
+    const under = this.onFloor(x, y, from);
+    this.first ??= under;
+    this.way = under && this.first && wayBetween(this.first, under);
+    if (!under || !this.first) return;
+    const to = add(from, subtract(under, this.first));
     this.session.annotations.addPending({
       ...{ requestId: this.pendingId, shape: 'measure', text: '', sizeM: DEFAULT_SIZE_M },
       ...{ colorRgba: this.state.colorRgba, pointInWorld: from },

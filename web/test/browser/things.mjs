@@ -88,7 +88,8 @@ async function inMap({ ann }, point) {
 
 /** Features of the map that are free to be clicked, far from each other. */
 async function features(context, count) {
-  const { features: all } = await context.map.get({ sessionId: context.sessionId });
+  const { map } = await context.map.get({ sessionId: context.sessionId });
+  const all = map.upserted;
   const box = await panel(context).boundingBox();
   const chosen = [];
   for (const { pointInWorldM: p, depthKnown } of all) {
@@ -202,9 +203,13 @@ async function dragged(context) {
   const { ann, check, shelf } = context;
   await does(context, 'select');
   const centre = (await inMap(context, xyz(shelf))).map((value, i) => value - (i === 1 ? 12 : 0));
+  const [x, y, z] = xyz(shelf);
+  const [from, to] = [await inMap(context, [x, y, z]), await inMap(context, [x - 0.8, y, z - 0.1])];
   await ann.page.mouse.move(...centre);
   await ann.page.mouse.down();
-  await ann.page.mouse.move(centre[0] - 60, centre[1] + 2, { steps: 4 });
+  await ann.page.mouse.move(centre[0] + to[0] - from[0], centre[1] + to[1] - from[1], {
+    steps: 4,
+  });
   await shot(context, 'dragged');
   await ann.page.mouse.up();
   const moved = await when(async () => {
