@@ -72,7 +72,7 @@ const std::vector<Home>& Homes() {
       {"seccomp.h", {"server/capture"}},
       {"apriltag/", {"server/markers"}},
       {"cairo", {"server/markers"}},
-      {"tiny_gltf.h", {"server/scene"}},
+      {"tiny_gltf.h", {"shared/models"}},
       {"fcl/", {"server/scene"}},
       {"opencv2/aruco", {"server/markers"}},
       {"opencv2/videoio", {}},
@@ -194,6 +194,7 @@ std::optional<std::string> CheckImport(string_view file, string_view target) {
   const string_view area = FolderOf(file.substr(string_view("web/").size()));  // src/session
   if (target.starts_with(".")) {
     const fs::path full = (fs::path(file).parent_path() / target).lexically_normal();
+    if (full.generic_string().starts_with("deploy/models/")) return std::nullopt;  // data
     if (!full.generic_string().starts_with("web/")) return "web sees proto alone";
     return std::nullopt;
   }
