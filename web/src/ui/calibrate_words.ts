@@ -108,7 +108,7 @@ export function adviceWords(now: Calibration | undefined): string {
     case CalibrationPhase.FITTING:
       return 'Put it down: the lens is being found';
     case CalibrationPhase.DONE:
-      return 'Done: the result is below';
+      return 'Done: here is the lens';
     case CalibrationPhase.FAILED:
       return capital(now.problem);
     default:
