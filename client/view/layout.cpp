@@ -37,7 +37,7 @@ Layout LayOut(float width, float height, float scale, bool tabs, float aspect,
   const float most_panel = std::max(width - out.tools.width - width / 3, 1.0f);
   const float panel = std::min(settings.panel_width * scale, most_panel);
   const float gaze = std::min(kGaze * scale, 0.5f * body);
-  const float talk = settings.talk_open ? std::floor(std::min(kTalk * scale, 0.38f * body))
+  const float talk = settings.talk_open ? std::floor(std::min(kTalk * scale, 0.35f * body))
                                         : std::floor(std::min(kTalkHead * scale, 0.1f * body));
   out.panel = {width - panel, top, panel, body - gaze - talk};
   out.talk = {width - panel, out.panel.bottom(), panel, talk};
