@@ -39,7 +39,7 @@ constexpr auto kControls = std::to_array<Control>({
     {kSwap, kCommand, "Swap", "s", "S", "swap the map and the video"},
     {kFollow, kCommand, "Follow", "f", "F", "keep the wearer in view"},
     {kWholeMap, kCommand, "Whole map", "h", "H", "bring the whole map into view"},
-    {kTop, kCommand, "From above", "4", "4", "look at the map from above"},
+    {kTop, kCommand, "From above", "6", "6", "look at the map from above"},
     {kReset, kCommand, "Reset map", "r", "R", "forget the map and start anew"},
     {kStop, kHead, "Stop", "x", "X", "stop the head where it is"},
     {kHome, kHead, "Ahead", "0", "0", "look straight ahead (home)"},

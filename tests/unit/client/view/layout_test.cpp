@@ -142,11 +142,11 @@ TEST_F(PictureFile, ASmallOneStaysAsItIsPixelForPixel) {
 }
 
 TEST_F(PictureFile, WhatIsNoneIsRefusedInWords) {
-  EXPECT_THAT(std::string(LoadPicture("").status().message()), HasSubstr("name a PNG or JPEG"));
+  EXPECT_THAT(std::string(LoadPicture("").status().message()), HasSubstr("name a PNG, JPEG or PDF"));
   EXPECT_THAT(std::string(LoadPicture("/nowhere.png").status().message()),
               HasSubstr("there is no file /nowhere.png"));
   EXPECT_THAT(std::string(LoadPicture(Write("a.txt", "hello")).status().message()),
-              HasSubstr("is no PNG and no JPEG"));
+              HasSubstr("is no PNG, no JPEG and no PDF"));
   EXPECT_THAT(std::string(LoadPicture(Write("b.png", "\x89PNG\r\n\x1a\nrest")).status().message()),
               HasSubstr("is damaged"));
 }

@@ -151,7 +151,7 @@ TEST(LiveCalibration, AnAprilGridThatIsShown) {
   auto target = MakeLensTarget("aprilgrid:6x6:0.088:0.3");
   ASSERT_TRUE(target.ok()) << target.status();
   std::optional<LiveCalibration> live;
-  for (std::size_t k = 0; k < files.size(); k += 2) {
+  for (std::size_t k = 0; k < files.size(); k += 3) {
     const cv::Mat grey = cv::imread(files[k], cv::IMREAD_GRAYSCALE);
     if (!live) live.emplace(*std::move(target), grey.size());
     live->Offer(k, static_cast<Timestamp>(k) * 1'000'000'000, grey);
@@ -159,7 +159,7 @@ TEST(LiveCalibration, AnAprilGridThatIsShown) {
   const auto report = live->Fit("test", {"brown_conrady"});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_LT(report->fit.rms_px, 0.2);
-  EXPECT_NEAR(report->fit.lens.fx, 458.654, 0.005 * 458.654);
+  EXPECT_NEAR(report->fit.lens.fx, 458.654, 0.01 * 458.654);  // of a third of the pictures
 }
 
 /// Waits for what the desk's thread does; a minute is a machine that does nothing else.
