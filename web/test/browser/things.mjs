@@ -235,6 +235,7 @@ async function undone(context) {
   await panel(context).locator('li button', { hasText: 'shelf' }).click();
   await ann.press('Delete');
   const gone = await when(async () => !(await shelfOf(context)));
+  await says(context, /deleted/); // one change at a time
   await ann.press('z');
   const again = await when(async () => Boolean(await shelfOf(context)));
   check(
