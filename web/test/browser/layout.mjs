@@ -81,6 +81,7 @@ async function atSize(context, size) {
       continue;
     }
     await button.click();
+    await panel.waitFor({ timeout: 3000 }).catch(() => undefined); // a slow page draws once a second
     await page.waitForTimeout(300);
     const problems = (await panel.isVisible()) ? await faults(page, size, true) : ['does not open'];
     context.check(`${name}, ${sheet} as a sheet`, problems);
