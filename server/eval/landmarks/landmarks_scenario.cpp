@@ -14,9 +14,9 @@
 #include "server/eval/run.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/statistics.hpp"
-#include "shared/models/shapes.hpp"
 #include "server/tracker/landmark_tracker.hpp"
 #include "server/tracker/square_pose.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {

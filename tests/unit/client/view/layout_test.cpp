@@ -142,7 +142,8 @@ TEST_F(PictureFile, ASmallOneStaysAsItIsPixelForPixel) {
 }
 
 TEST_F(PictureFile, WhatIsNoneIsRefusedInWords) {
-  EXPECT_THAT(std::string(LoadPicture("").status().message()), HasSubstr("name a PNG, JPEG or PDF"));
+  EXPECT_THAT(std::string(LoadPicture("").status().message()),
+              HasSubstr("name a PNG, JPEG or PDF"));
   EXPECT_THAT(std::string(LoadPicture("/nowhere.png").status().message()),
               HasSubstr("there is no file /nowhere.png"));
   EXPECT_THAT(std::string(LoadPicture(Write("a.txt", "hello")).status().message()),

@@ -7,9 +7,9 @@
 #include "server/eval/landmarks/squares_source.hpp"
 #include "server/eval/run_recorder.hpp"
 #include "server/eval/score.hpp"
-#include "shared/models/shapes.hpp"
 #include "server/tracker/landmark_tracker.hpp"
 #include "server/tracker/make_tracker.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {
