@@ -85,6 +85,7 @@ CornerLook LookAtCorners(const cv::Mat& grey, const SquareGuess& guess, const Sq
   std::array<Vector2d, 4> corners;
   for (int c = 0; c < 4; ++c) {
     corners[c] = search.corners[c] ? search.corners[c]->pixel : guess.corners[c] + shift;
+    if (!corners[c].allFinite()) return look;
   }
   int seen = 0;
   for (int c = 0; c < 4; ++c) {

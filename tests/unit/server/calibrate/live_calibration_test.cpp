@@ -45,9 +45,8 @@ Sheet CharucoSheet() {
 }
 
 /// A grid of markers, drawn one by one into the places `corner` says (upper left, print pixels).
-Sheet GridSheet(int dictionary, int columns, int rows, double side_m, double gap_m, int border,
-                bool from_below, bool turned) {
-  Sheet sheet{{}, 2500, {}, from_below, {}};
+Sheet GridSheet(int dictionary, int columns, int rows, double side_m, double gap_m, int border) {
+  Sheet sheet{{}, 2500, {}, false, {}};
   const int side = static_cast<int>(std::lround(side_m * sheet.px_per_m));
   const int pitch = static_cast<int>(std::lround((side_m + gap_m) * sheet.px_per_m)), edge = 40;
   sheet.print.create(2 * edge + rows * pitch, 2 * edge + columns * pitch, CV_8UC1);
@@ -56,18 +55,11 @@ Sheet GridSheet(int dictionary, int columns, int rows, double side_m, double gap
   for (int id = 0; id < columns * rows; ++id) {
     cv::Mat marker;
     cv::aruco::drawMarker(codes, id, side, marker, border);
-    if (turned) cv::rotate(marker, marker, cv::ROTATE_180);
-    const int row = from_below ? rows - 1 - id / columns : id / columns;
+    const int row = id / columns;
     const cv::Point at(edge + id % columns * pitch, edge + row * pitch);
     marker.copyTo(sheet.print(cv::Rect(at, marker.size())));
   }
-  const int gap = pitch - side;
-  for (int k = 0; from_below && k < (columns + 1) * (rows + 1); ++k) {  // Kalibr's small squares
-    const cv::Point at(edge + k % (columns + 1) * pitch - gap,
-                       edge + k / (columns + 1) * pitch - gap);
-    sheet.print(cv::Rect(at, cv::Size(gap, gap))).setTo(0);
-  }
-  sheet.origin_px = {edge - 0.5, edge - 0.5 + (from_below ? (rows - 1) * pitch + side : 0)};
+  sheet.origin_px = {edge - 0.5, edge - 0.5};
   sheet.size_m = {columns * (side_m + gap_m), rows * (side_m + gap_m)};
   return sheet;
 }
@@ -132,15 +124,13 @@ TEST_P(LiveTargets, TheLensIsFoundAndSoIsWhatIsMissing) {
   EXPECT_EQ(report->board, live.target().words());
 }
 
-INSTANTIATE_TEST_SUITE_P(All, LiveTargets,
-                         ::testing::Values(Case{"Charuco", "charuco:7x5:0.04:0.03", CharucoSheet},
-                                           Case{"ArucoGrid",
-                                                "arucogrid:5x4:0.04:0.012:aruco_6x6_250",
-                                                [] {
-                                                  return GridSheet(cv::aruco::DICT_6X6_250, 5, 4,
-                                                                   0.04, 0.012, 1, false, false);
-                                                }}),
-                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    All, LiveTargets,
+    ::testing::Values(Case{"Charuco", "charuco:7x5:0.04:0.03", CharucoSheet},
+                      Case{
+                          "ArucoGrid", "arucogrid:5x4:0.04:0.012:aruco_6x6_250",
+                          [] { return GridSheet(cv::aruco::DICT_6X6_250, 5, 4, 0.04, 0.012, 1); }}),
+    [](const auto& test) { return test.param.name; });
 
 // Of an AprilGrid real pictures: of EuRoC's camera, whose makers say fx 458.654.
 TEST(LiveCalibration, AnAprilGridThatIsShown) {
