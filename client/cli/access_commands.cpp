@@ -59,7 +59,7 @@ std::string StateOf(const net::Invite& invite) {
   return invite.used >= invite.uses ? "used up" : "open";
 }
 
-nlohmann::json ToJson(const net::Invite& invite) {
+nlohmann::json InviteJson(const net::Invite& invite) {
   return {{"id", invite.id},
           {"role", invite.role},
           {"label", invite.label},
@@ -111,7 +111,7 @@ absl::Status RunInvite(const Options& options, net::AccessClient& client) {
       client.Create(options.invite_role, life_s, options.uses, options.label, options.waiting_room);
   if (!made.ok()) return made.status();
   if (options.json) {
-    nlohmann::json json = ToJson(made->invite);
+    nlohmann::json json = InviteJson(made->invite);
     json["link"] = made->link;
     std::cout << Dump(json) << "\n";
     return absl::OkStatus();
@@ -131,7 +131,7 @@ absl::Status RunInvites(const Options& options, net::AccessClient& client) {
   if (!invites.ok()) return invites.status();
   if (options.json) {
     nlohmann::json all = nlohmann::json::array();
-    for (const net::Invite& invite : *invites) all.push_back(ToJson(invite));
+    for (const net::Invite& invite : *invites) all.push_back(InviteJson(invite));
     std::cout << Dump(all, 2) << "\n";
     return absl::OkStatus();
   }

@@ -13,7 +13,7 @@ namespace saccade::cli {
 namespace {
 
 // The server gives the head up 500 ms after the last heartbeat: whoever interrupts this stops it.
-constexpr std::chrono::milliseconds kHeartbeat(100);
+constexpr std::chrono::milliseconds kProgressPoll(100);
 
 // Progress goes to stderr, as JSON where answers are.
 void SayProgress(const Options& options, int tenths) {
@@ -32,7 +32,7 @@ absl::StatusOr<MountCalibrationReport> Wait(const Options& options, net::Connect
     const int tenths = static_cast<int>(10 * report->share);
     if (tenths != said) SayProgress(options, tenths);
     said = tenths;
-    std::this_thread::sleep_for(kHeartbeat);
+    std::this_thread::sleep_for(kProgressPoll);
   }
 }
 

@@ -1,16 +1,11 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
-#include <numbers>
-
 #include "client/cli/text.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade::cli {
-namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
-
-}  // namespace
+namespace {}  // namespace
 
 nlohmann::json ToJson(const MountCalibrationReport& report) {
   nlohmann::json joints = nlohmann::json::array();

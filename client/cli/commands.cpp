@@ -93,7 +93,7 @@ std::string MapText(const net::MapState& map) {
 // One line a second.
 class WatchPrinter {
  public:
-  explicit WatchPrinter(bool json) : json_(json) {}
+  explicit WatchPrinter(bool as_json) : json_(as_json) {}
 
   void Print(const net::WatchEvent& event) {
     if (const auto* pose = std::get_if<MapSnapshot>(&event)) pose_ = *pose;

@@ -4,18 +4,17 @@
 #include <chrono>
 #include <cmath>
 #include <iostream>
-#include <numbers>
 #include <thread>
 
 #include "client/cli/commands.hpp"
 #include "client/cli/interrupt.hpp"
 #include "client/cli/text.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade::cli {
 namespace {
 
 constexpr std::chrono::milliseconds kHeartbeat(100);  // the server waits 500 ms for one
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kHome_rad = 0.5 * kDegree;
 
 std::string StateText(const GazeSnapshot& state) {

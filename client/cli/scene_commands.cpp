@@ -38,34 +38,34 @@ Eigen::Vector3d Vector(const std::string& text) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
-nlohmann::json ToJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+nlohmann::json SceneJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-nlohmann::json ToJson(const SceneObject& object) {
+nlohmann::json SceneJson(const SceneObject& object) {
   const Eigen::Quaterniond& q = object.parent_from_object.rotation;
   return {{"id", object.id},
           {"name", object.name},
           {"shape", kShapes[static_cast<std::size_t>(object.shape)]},
           {"material", kMaterials[static_cast<std::size_t>(object.material)]},
           {"model", object.model},
-          {"size_m", ToJson(object.size_m)},
+          {"size_m", SceneJson(object.size_m)},
           {"scale", object.scale},
           {"annotation_id", object.annotation_id},
-          {"position_m", ToJson(object.parent_from_object.translation)},
+          {"position_m", SceneJson(object.parent_from_object.translation)},
           {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
 
-nlohmann::json ToJson(const net::ModelFacts& model) {
+nlohmann::json SceneJson(const net::ModelFacts& model) {
   return {{"id", model.id},
           {"name", model.name},
           {"triangles", model.triangles},
           {"bytes", model.bytes},
-          {"size_m", ToJson(model.size_m)}};
+          {"size_m", SceneJson(model.size_m)}};
 }
 
-nlohmann::json ToJson(const net::Touch& touch) {
+nlohmann::json SceneJson(const net::Touch& touch) {
   return {{"object_id", touch.object_id},
           {"object_name", touch.object_name},
-          {"point_m", ToJson(touch.point_in_world)},
+          {"point_m", SceneJson(touch.point_in_world)},
           {"moved_m", touch.moved_m}};
 }
 
@@ -78,7 +78,7 @@ std::string Line(const SceneObject& object) {
 }
 
 void Print(const Options& options, const SceneObject& object) {
-  std::cout << (options.json ? Dump(ToJson(object)) + "\n" : Line(object));
+  std::cout << (options.json ? Dump(SceneJson(object)) + "\n" : Line(object));
 }
 
 absl::Status RunList(const Options& options, net::SceneClient& client) {
@@ -86,8 +86,8 @@ absl::Status RunList(const Options& options, net::SceneClient& client) {
   if (!list.ok()) return list.status();
   if (options.json) {
     nlohmann::json objects = nlohmann::json::array(), models = nlohmann::json::array();
-    for (const SceneObject& object : list->objects) objects.push_back(ToJson(object));
-    for (const net::ModelFacts& model : list->models) models.push_back(ToJson(model));
+    for (const SceneObject& object : list->objects) objects.push_back(SceneJson(object));
+    for (const net::ModelFacts& model : list->models) models.push_back(SceneJson(model));
     std::cout << Dump({{"revision", list->revision}, {"objects", objects}, {"models", models}}, 2)
               << "\n";
     return absl::OkStatus();
@@ -193,9 +193,9 @@ absl::Status RunPlace(const Options& options, net::SceneClient& client) {
   const absl::StatusOr<net::PlacedThing> placed = client.Place(*object, push, gravity);
   if (!placed.ok()) return placed.status();
   if (options.json) {
-    nlohmann::json json = {{"object", ToJson(placed->object)},
-                           {"support", ToJson(placed->support)}};
-    if (placed->stop) json["stop"] = ToJson(*placed->stop);
+    nlohmann::json json = {{"object", SceneJson(placed->object)},
+                           {"support", SceneJson(placed->support)}};
+    if (placed->stop) json["stop"] = SceneJson(*placed->stop);
     std::cout << Dump(json) << "\n";
     return absl::OkStatus();
   }
@@ -251,7 +251,7 @@ absl::Status RunRegister(const Options& options, net::SceneClient& client) {
       client.Register(object->id, *points, options.scene.with_scale, options.scene.accept);
   if (!found.ok()) return found.status();
   if (options.json) {
-    std::cout << Dump({{"object", ToJson(found->object)},
+    std::cout << Dump({{"object", SceneJson(found->object)},
                        {"accepted", options.scene.accept},
                        {"rms_mm", found->rms_mm},
                        {"left_out_rms_mm", found->left_out_rms_mm},

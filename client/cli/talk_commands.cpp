@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
-nlohmann::json ToJson(const net::ChatMessage& message) {
+nlohmann::json ChatJson(const net::ChatMessage& message) {
   return {{"number", message.number},
           {"display_name", message.display_name},
           {"text", message.text},
@@ -37,7 +37,7 @@ std::string Line(const net::ChatMessage& message) {
 }
 
 void Print(const Options& options, const net::ChatMessage& message) {
-  std::cout << (options.json ? Dump(ToJson(message)) : Line(message)) << std::endl;
+  std::cout << (options.json ? Dump(ChatJson(message)) : Line(message)) << std::endl;
 }
 
 absl::Status RunPause(const Options& options, net::Connection& client) {

@@ -13,7 +13,7 @@
 namespace saccade::cli {
 namespace {
 
-nlohmann::json ToJson(const net::Waiting& person) {
+nlohmann::json WaitingJson(const net::Waiting& person) {
   return {{"id", person.id},
           {"display_name", person.display_name},
           {"role", person.role},
@@ -53,7 +53,7 @@ absl::Status RunWaiting(const Options& options, net::AccessClient& client) {
   if (!people.ok()) return people.status();
   if (options.json) {
     nlohmann::json all = nlohmann::json::array();
-    for (const net::Waiting& person : *people) all.push_back(ToJson(person));
+    for (const net::Waiting& person : *people) all.push_back(WaitingJson(person));
     std::cout << Dump(all, 2) << "\n";
     return absl::OkStatus();
   }
@@ -72,7 +72,7 @@ absl::Status RunAdmit(const Options& options, net::AccessClient& client) {
   const absl::StatusOr<net::Waiting> person = client.Admit(*id, options.refuse);
   if (!person.ok()) return person.status();
   if (options.json) {
-    std::cout << Dump(ToJson(*person)) << "\n";
+    std::cout << Dump(WaitingJson(*person)) << "\n";
   } else {
     std::cout << person->display_name
               << (options.refuse ? " was sent away\n"

@@ -7,11 +7,11 @@
 #include <numbers>
 
 #include "client/tools/words.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade::tools {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kHomeRad = 0.5 * kDegree;
 constexpr std::array<const char*, 8> kSides = {"right", "right and down", "down", "left and down",
                                                "left",  "left and up",    "up",   "right and up"};

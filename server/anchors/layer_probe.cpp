@@ -11,27 +11,28 @@
 namespace saccade {
 namespace {
 
-constexpr FrameId kStride = 3;           // frames between those that are considered
-constexpr std::size_t kMostViews = 6;    // that see it most from beside...
-constexpr std::size_t kFewestViews = 3;  // ...and how many a pixel needs
-constexpr double kLeastParallax_px = 5.0;
-constexpr double kMostParallax_px = 40.0;
-constexpr double kNearest = 0.5, kFarthest = 2.0;  // of the guess
-constexpr int kHalf = 14;                          // of the picture's part that is compared [px]
-constexpr int kSize = 2 * kHalf + 1;
-constexpr int kWindow_px = 7;            // that tells the depth of one pixel
-constexpr double kReach_px = 5.0;        // sigma of what counts as at the click
-constexpr int kRadius_px = 10;           // beyond it nothing counts
-constexpr double kLeastDeviation = 4.0;  // of a window [grey levels]
-constexpr double kGoodScore = 0.7, kLead = 0.08;
-constexpr int kPeak = 2;               // steps that belong to one peak
-constexpr int kFewestPixels = 20;      // with a depth
-constexpr double kTolerance_px = 1.2;  // of one surface, in the view most from beside
-constexpr double kTolerance = 0.012;   // the same, share of inverse depth
-constexpr double kLeastShare = 0.08;   // of a second surface
-constexpr double kRelief_px = 5.0;  // what a window cannot tell apart: relief as deep as it is wide
-constexpr int kSectors = 8;         // round the click
-constexpr double kMaxSlope = 4.0;   // |d ln(rho) / d angle|
+constexpr FrameId kLayerStride = 3;           // frames between those that are considered
+constexpr std::size_t kLayerMostViews = 6;    // that see it most from beside...
+constexpr std::size_t kLayerFewestViews = 3;  // ...and how many a pixel needs
+constexpr double kLayerLeastParallax_px = 5.0;
+constexpr double kLayerMostParallax_px = 40.0;
+constexpr double kLayerNearest = 0.5, kLayerFarthest = 2.0;  // of the guess
+constexpr int kLayerHalf = 14;  // of the picture's part that is compared [px]
+constexpr int kLayerSize = 2 * kLayerHalf + 1;
+constexpr int kLayerWindow_px = 7;            // that tells the depth of one pixel
+constexpr double kLayerReach_px = 5.0;        // sigma of what counts as at the click
+constexpr int kLayerRadius_px = 10;           // beyond it nothing counts
+constexpr double kLayerLeastDeviation = 4.0;  // of a window [grey levels]
+constexpr double kLayerGoodScore = 0.7, kLayerLead = 0.08;
+constexpr int kLayerPeak = 2;               // steps that belong to one peak
+constexpr int kLayerFewestPixels = 20;      // with a depth
+constexpr double kLayerTolerance_px = 1.2;  // of one surface, in the view most from beside
+constexpr double kLayerTolerance = 0.012;   // the same, share of inverse depth
+constexpr double kLayerLeastShare = 0.08;   // of a second surface
+constexpr double kLayerRelief_px =
+    5.0;                          // what a window cannot tell apart: relief as deep as it is wide
+constexpr int kLayerSectors = 8;  // round the click
+constexpr double kLayerMaxSlope = 4.0;  // |d ln(rho) / d angle|
 
 /// A pixel near the click whose depth is known.
 struct DepthPixel {
@@ -58,7 +59,9 @@ class LayerSweep {
 
   bool Gather(FrameId newest, const FrameLookup& frames, const PoseTrail* trail);
   std::vector<DepthPixel> Measure();
-  double tolerance(double rho) const { return std::max(kTolerance_px * step_, kTolerance * rho); }
+  double tolerance(double rho) const {
+    return std::max(kLayerTolerance_px * step_, kLayerTolerance * rho);
+  }
   double step() const { return step_; }
   double focal_px() const { return focal_px_; }
 
@@ -77,23 +80,23 @@ class LayerSweep {
 bool LayerSweep::Gather(FrameId newest, const FrameLookup& frames, const PoseTrail* trail) {
   const CameraModel& camera = *clicked_.frame->camera;
   const cv::Mat& grey = clicked_.frame->grey;
-  const cv::Rect part(static_cast<int>(centre_.x()) - kHalf, static_cast<int>(centre_.y()) - kHalf,
-                      kSize, kSize);
+  const cv::Rect part(static_cast<int>(centre_.x()) - kLayerHalf,
+                      static_cast<int>(centre_.y()) - kLayerHalf, kLayerSize, kLayerSize);
   if ((part & cv::Rect(0, 0, grey.cols, grey.rows)) != part) return false;
   const auto bearing = camera.Unproject(centre_);
   if (!bearing || bearing->z() <= 0.0) return false;
   const Eigen::Vector3d ray = bearing->normalized();
   views_ = ViewsFromBeside(clicked_, ray, guess_z_ / ray.z(), newest, frames, trail,
-                           {.stride = kStride,
-                            .most = kMostViews,
-                            .least_parallax_px = kLeastParallax_px,
-                            .most_parallax_px = kMostParallax_px});
-  if (views_.size() < kFewestViews) return false;
+                           {.stride = kLayerStride,
+                            .most = kLayerMostViews,
+                            .least_parallax_px = kLayerLeastParallax_px,
+                            .most_parallax_px = kLayerMostParallax_px});
+  if (views_.size() < kLayerFewestViews) return false;
   step_ = 1.0 / (guess_z_ * views_.front().parallax_px);
   grey(part).convertTo(own_, CV_32F);
   cv::Mat squares;
-  cv::boxFilter(own_, own_mean_, CV_32F, {kWindow_px, kWindow_px});
-  cv::boxFilter(own_.mul(own_), squares, CV_32F, {kWindow_px, kWindow_px});
+  cv::boxFilter(own_, own_mean_, CV_32F, {kLayerWindow_px, kLayerWindow_px});
+  cv::boxFilter(own_.mul(own_), squares, CV_32F, {kLayerWindow_px, kLayerWindow_px});
   cv::sqrt(cv::max(squares - own_mean_.mul(own_mean_), 0.0), own_deviation_);
   return true;
 }
@@ -102,33 +105,34 @@ bool LayerSweep::Gather(FrameId newest, const FrameLookup& frames, const PoseTra
 std::optional<cv::Mat> LayerSweep::Look(const BesideView& view, double rho) const {
   const CameraModel& camera = *view.past.frame->camera;
   std::array<cv::Point2f, 3> from, to;
-  const std::array<Eigen::Vector2d, 3> corners = {
-      Eigen::Vector2d(-kHalf, -kHalf), {kHalf, -kHalf}, {-kHalf, kHalf}};
+  const std::array<Eigen::Vector2d, 3> corners = {Eigen::Vector2d(-kLayerHalf, -kLayerHalf),
+                                                  {kLayerHalf, -kLayerHalf},
+                                                  {-kLayerHalf, kLayerHalf}};
   for (std::size_t k = 0; k < 3; ++k) {
     const auto bearing = clicked_.frame->camera->Unproject(centre_ + corners[k]);
     if (!bearing || bearing->z() <= 0.0) return std::nullopt;
     const auto pixel = camera.Project(view.view_from_clicked * (*bearing / bearing->z() / rho));
     if (!pixel || !camera.InImage(*pixel, 2.0)) return std::nullopt;
-    from[k] = {static_cast<float>(corners[k].x() + kHalf),
-               static_cast<float>(corners[k].y() + kHalf)};
+    from[k] = {static_cast<float>(corners[k].x() + kLayerHalf),
+               static_cast<float>(corners[k].y() + kLayerHalf)};
     to[k] = {static_cast<float>(pixel->x()), static_cast<float>(pixel->y())};
   }
   cv::Mat look, part;
   cv::warpAffine(view.past.frame->grey, look, cv::getAffineTransform(from.data(), to.data()),
-                 {kSize, kSize}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
+                 {kLayerSize, kLayerSize}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
   look.convertTo(part, CV_32F);
   return part;
 }
 
 /// Adds the correlation of each pixel's window.
 void LayerSweep::AddScore(const cv::Mat& look, cv::Mat& sum, cv::Mat& count) const {
-  const cv::Size window(kWindow_px, kWindow_px);
+  const cv::Size window(kLayerWindow_px, kLayerWindow_px);
   cv::Mat mean, squares, cross;
   cv::boxFilter(look, mean, CV_32F, window);
   cv::boxFilter(look.mul(look), squares, CV_32F, window);
   cv::boxFilter(look.mul(own_), cross, CV_32F, window);
-  for (int y = 0; y < kSize; ++y) {
-    for (int x = 0; x < kSize; ++x) {
+  for (int y = 0; y < kLayerSize; ++y) {
+    for (int x = 0; x < kLayerSize; ++x) {
       const float m = mean.at<float>(y, x), own = own_deviation_.at<float>(y, x);
       const float deviation = std::sqrt(std::max(0.0f, squares.at<float>(y, x) - m * m));
       if (deviation < 1.5f || own < 1.5f) continue;
@@ -141,29 +145,29 @@ void LayerSweep::AddScore(const cv::Mat& look, cv::Mat& sum, cv::Mat& count) con
 }
 
 std::vector<DepthPixel> LayerSweep::Measure() {
-  const double low = 1.0 / (kFarthest * guess_z_), high = 1.0 / (kNearest * guess_z_);
+  const double low = 1.0 / (kLayerFarthest * guess_z_), high = 1.0 / (kLayerNearest * guess_z_);
   const int steps = 1 + static_cast<int>(std::ceil((high - low) / step_));
   std::vector<cv::Mat> scores;
   for (int k = 0; k < steps; ++k) {
-    cv::Mat sum = cv::Mat::zeros(kSize, kSize, CV_32F), count = sum.clone();
+    cv::Mat sum = cv::Mat::zeros(kLayerSize, kLayerSize, CV_32F), count = sum.clone();
     for (const BesideView& view : views_) {
       if (const auto look = Look(view, low + k * step_)) AddScore(*look, sum, count);
     }
-    if (count.at<float>(0, 0) < static_cast<float>(kFewestViews)) count.setTo(1e9f);
+    if (count.at<float>(0, 0) < static_cast<float>(kLayerFewestViews)) count.setTo(1e9f);
     scores.push_back(sum / count);
   }
   std::vector<DepthPixel> pixels;
-  for (int y = -kRadius_px; y <= kRadius_px; ++y) {
-    for (int x = -kRadius_px; x <= kRadius_px; ++x) {
-      if (x * x + y * y > kRadius_px * kRadius_px) continue;
-      if (own_deviation_.at<float>(y + kHalf, x + kHalf) < kLeastDeviation) continue;
-      const auto score = [&](int k) { return scores[k].at<float>(y + kHalf, x + kHalf); };
+  for (int y = -kLayerRadius_px; y <= kLayerRadius_px; ++y) {
+    for (int x = -kLayerRadius_px; x <= kLayerRadius_px; ++x) {
+      if (x * x + y * y > kLayerRadius_px * kLayerRadius_px) continue;
+      if (own_deviation_.at<float>(y + kLayerHalf, x + kLayerHalf) < kLayerLeastDeviation) continue;
+      const auto score = [&](int k) { return scores[k].at<float>(y + kLayerHalf, x + kLayerHalf); };
       int best = 0;
       for (int k = 1; k < steps; ++k) best = score(k) > score(best) ? k : best;
-      if (best == 0 || best + 1 == steps || score(best) < kGoodScore) continue;
+      if (best == 0 || best + 1 == steps || score(best) < kLayerGoodScore) continue;
       bool alone = true;
       for (int k = 0; k < steps && alone; ++k) {
-        alone = std::abs(k - best) <= kPeak || score(k) < score(best) - kLead;
+        alone = std::abs(k - best) <= kLayerPeak || score(k) < score(best) - kLayerLead;
       }
       if (!alone) continue;
       const double a = score(best - 1), b = score(best), c = score(best + 1);
@@ -171,7 +175,7 @@ std::vector<DepthPixel> LayerSweep::Measure() {
       const double shift = curve < 0.0 ? std::clamp(0.5 * (a - c) / curve, -0.5, 0.5) : 0.0;
       pixels.push_back({static_cast<double>(x), static_cast<double>(y),
                         low + (best + shift) * step_,
-                        std::exp(-0.5 * (x * x + y * y) / (kReach_px * kReach_px))});
+                        std::exp(-0.5 * (x * x + y * y) / (kLayerReach_px * kLayerReach_px))});
     }
   }
   return pixels;
@@ -180,11 +184,12 @@ std::vector<DepthPixel> LayerSweep::Measure() {
 /// How far from the click pixels have a depth, on the side where that is least far.
 double ReachOf(const std::vector<DepthPixel>& pixels) {
   // The farthest two of each side: one may be wrong.
-  std::array<std::array<double, 2>, kSectors> farthest{};
+  std::array<std::array<double, 2>, kLayerSectors> farthest{};
   for (const DepthPixel& pixel : pixels) {
     const double radius = std::hypot(pixel.x, pixel.y);
     const double turn = std::atan2(pixel.y, pixel.x) / (2.0 * std::numbers::pi) + 0.5;
-    auto& [first, second] = farthest[std::min(kSectors - 1, static_cast<int>(turn * kSectors))];
+    auto& [first, second] =
+        farthest[std::min(kLayerSectors - 1, static_cast<int>(turn * kLayerSectors))];
     if (radius > first) {
       second = std::exchange(first, radius);
     } else {
@@ -212,7 +217,8 @@ Surface BestSurface(const std::vector<DepthPixel>& pixels, const LayerSweep& swe
       if (std::abs(m.determinant()) < 20.0) continue;
       surface.coefficients = m.inverse() * Eigen::Vector3d(a.rho, b.rho, c.rho);
       const double slope = surface.coefficients.tail<2>().norm() * sweep.focal_px();
-      if (surface.coefficients(0) <= 0.0 || slope > kMaxSlope * surface.coefficients(0)) continue;
+      if (surface.coefficients(0) <= 0.0 || slope > kLayerMaxSlope * surface.coefficients(0))
+        continue;
     }
     surface.score = 0.0;
     for (const DepthPixel& pixel : pixels) {
@@ -237,7 +243,7 @@ std::optional<DepthLayers> ProbeLayers(const PastFrame& clicked, const Eigen::Ve
   LayerSweep sweep(clicked, pixel, guess_m * bearing->z());
   if (!sweep.Gather(newest, frames, trail)) return std::nullopt;
   const std::vector<DepthPixel> pixels = sweep.Measure();
-  if (pixels.size() < kFewestPixels) return std::nullopt;
+  if (pixels.size() < kLayerFewestPixels) return std::nullopt;
   const Surface first = BestSurface(pixels, sweep);
   if (first.score <= 0.0) return std::nullopt;
   double total = 0.0, on_first = 0.0;
@@ -255,10 +261,10 @@ std::optional<DepthLayers> ProbeLayers(const PastFrame& clicked, const Eigen::Ve
   const double rho = first.coefficients(0);
   layers.range_m = 1.0 / (rho * bearing->z());
   layers.sigma_m =
-      layers.range_m * std::hypot(0.3 * sweep.step() / rho, kRelief_px / sweep.focal_px());
+      layers.range_m * std::hypot(0.3 * sweep.step() / rho, kLayerRelief_px / sweep.focal_px());
   layers.reach_px = ReachOf(pixels);
   // Wrong matches are everywhere; another surface is where many agree.
-  if (others.size() < kFewestPixels / 2) return layers;
+  if (others.size() < kLayerFewestPixels / 2) return layers;
   const Surface second = BestSurface(others, sweep);
   double on_second = 0.0;
   std::vector<double> distances_px;
@@ -269,7 +275,7 @@ std::optional<DepthLayers> ProbeLayers(const PastFrame& clicked, const Eigen::Ve
     }
   }
   const double share = on_second / total;
-  if (second.score <= 0.0 || distances_px.size() < 3 || share < kLeastShare) return layers;
+  if (second.score <= 0.0 || distances_px.size() < 3 || share < kLayerLeastShare) return layers;
   std::nth_element(distances_px.begin(), distances_px.begin() + 2, distances_px.end());
   layers.other_from_px = distances_px[2];  // one or two may be wrong
   layers.other_share = share;

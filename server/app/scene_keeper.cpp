@@ -293,7 +293,7 @@ absl::StatusOr<RegisteredObject> SceneKeeper::RegisterOne(const RegisterSceneObj
   }
   // Points of a model are told before its scale; without one to find it stays as it is.
   const double scale = model && !command.with_scale ? object->scale : 1.0;
-  std::vector<Correspondence> pairs;
+  std::vector<PointPair> pairs;
   for (const auto& [in_object, in_world] : command.object_and_world) {
     pairs.push_back({scale * in_object, in_world});
   }

@@ -13,7 +13,7 @@ namespace {
 using Views = std::vector<const BoardView*>;
 
 constexpr double kStartHuber_px = 5, kLeastHuber_px = 0.1;
-constexpr int kStartIterations = 20, kIterations = 60, kRounds = 6;
+constexpr int kStartIterations = 20, kIterations = 60, kFitRounds = 6;
 // A view this much worse than the median is another matter than noise.
 constexpr double kViewOutlier = 3.0, kLeastOutlier_px = 0.15;
 constexpr double kWorstRms_px = 3.0;
@@ -147,7 +147,7 @@ std::optional<Solution> Solve(const LensProblem& problem, const std::vector<Boar
   solution.state = Begin(problem, solution.used, picture);
   if (!(solution.state.cost < kNoCost)) return std::nullopt;
   const std::vector<bool> all(problem.parameters(), true);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFitRounds; ++round) {
     problem.Minimise(solution.used, all, solution.huber_px, kIterations, solution.state);
     solution.huber_px = HuberOf(problem, solution.used, solution.state);
     std::vector<BoardPose> poses;

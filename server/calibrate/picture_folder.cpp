@@ -41,7 +41,7 @@ absl::StatusOr<std::vector<std::filesystem::path>> PicturesIn(const std::filesys
 }
 
 absl::StatusOr<cv::Mat> LoadGrey(const std::filesystem::path& file) {
-  absl::StatusOr<Picture> picture = LoadPicture(file);
+  absl::StatusOr<DecodedPicture> picture = LoadPicture(file);
   if (!picture.ok()) return picture.status();
   return picture->grey;
 }

@@ -14,7 +14,7 @@ constexpr Timestamp kSoonAfter_ns = 200'000'000;
 constexpr double kHardlyMoved = 0.004;  // of the picture's width
 constexpr double kDiffers = 0.12;
 constexpr double kNominalFocal = 0.85;  // of the width: 60 deg
-constexpr double kTilted = 0.3;         // sine of the tilt: 17 deg
+constexpr double kPickTilted = 0.3;     // sine of the tilt: 17 deg
 constexpr int kTiltsWanted = 3;
 constexpr double kNear = 0.45;  // the board's diagonal against the picture's
 
@@ -87,10 +87,10 @@ double ViewPicker::Covered() const {
 std::string ViewPicker::TiltAdvice() const {
   int left = 0, right = 0, up = 0, down = 0;
   for (const Place& place : places_) {
-    left += place.tilt_x < -kTilted;
-    right += place.tilt_x > kTilted;
-    up += place.tilt_y < -kTilted;
-    down += place.tilt_y > kTilted;
+    left += place.tilt_x < -kPickTilted;
+    right += place.tilt_x > kPickTilted;
+    up += place.tilt_y < -kPickTilted;
+    down += place.tilt_y > kPickTilted;
   }
   if (std::min(left, right) < kTiltsWanted) {
     return absl::StrCat("turn the board by 30 degrees, its ", left < right ? "left" : "right",

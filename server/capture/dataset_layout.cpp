@@ -36,7 +36,8 @@ absl::Status AssumeLens(double fps, const SourceOptions& options, DatasetLayout&
   constexpr std::size_t kTries = 50;
   absl::Status last;
   for (std::size_t i = 0; i < std::min(kTries, layout.entries.size()); ++i) {
-    const absl::StatusOr<Picture> picture = LoadPicture(layout.pictures / layout.entries[i].file);
+    const absl::StatusOr<DecodedPicture> picture =
+        LoadPicture(layout.pictures / layout.entries[i].file);
     last = picture.status();
     if (!picture.ok()) continue;
     const double view_deg = options.view_deg.value_or(kAssumedView_deg);

@@ -26,7 +26,7 @@ FrameDecoder::FrameDecoder(std::filesystem::path folder, std::vector<ImageEntry>
 absl::StatusOr<Frame> FrameDecoder::Decode(std::size_t index) const {
   const ImageEntry& entry = entries_[index];
   const auto check = [this](cv::Size size) { return CheckSize(size); };
-  absl::StatusOr<Picture> picture = LoadPicture(folder_ / entry.file, check);
+  absl::StatusOr<DecodedPicture> picture = LoadPicture(folder_ / entry.file, check);
   if (!picture.ok()) return picture.status();
   // What was decoded, where the header said something else.
   if (const absl::Status size = CheckSize(picture->grey.size()); !size.ok()) {

@@ -18,7 +18,7 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr std::size_t kMaxBytes = std::size_t{256} << 20;
+constexpr std::size_t kMaxPictureFileBytes = std::size_t{256} << 20;
 
 bool StartsWith(Bytes data, Bytes magic) {
   return data.size() >= magic.size() && std::memcmp(data.data(), magic.data(), magic.size()) == 0;
@@ -71,7 +71,7 @@ absl::Status CheckSize(cv::Size size, const SizeCheck& check) {
 }
 
 /// May throw what OpenCV and the allocator throw.
-absl::StatusOr<Picture> Decode(Bytes bytes) {
+absl::StatusOr<DecodedPicture> Decode(Bytes bytes) {
   // A view of the bytes; OpenCV does not write into it.
   const cv::Mat view(1, static_cast<int>(bytes.size()), CV_8UC1,
                      const_cast<std::uint8_t*>(bytes.data()));
@@ -80,7 +80,7 @@ absl::StatusOr<Picture> Decode(Bytes bytes) {
   if (decoded.depth() != CV_8U) {
     return absl::DataLossError("it has more than 8 bits a channel; convert it to 8 bits");
   }
-  Picture picture;
+  DecodedPicture picture;
   if (decoded.channels() == 1) {
     picture.grey = decoded;
   } else if (decoded.channels() == 3 || decoded.channels() == 4) {
@@ -95,7 +95,7 @@ absl::StatusOr<Picture> Decode(Bytes bytes) {
 
 }  // namespace
 
-absl::StatusOr<Picture> DecodePicture(Bytes bytes, const SizeCheck& check) {
+absl::StatusOr<DecodedPicture> DecodePicture(Bytes bytes, const SizeCheck& check) {
   if (const absl::Status whole = CheckWhole(bytes); !whole.ok()) return whole;
   const absl::StatusOr<cv::Size> size = ReadPictureSize(bytes);
   if (!size.ok()) return size.status();
@@ -109,13 +109,15 @@ absl::StatusOr<Picture> DecodePicture(Bytes bytes, const SizeCheck& check) {
   }
 }
 
-absl::StatusOr<Picture> LoadPicture(const std::filesystem::path& file, const SizeCheck& check) {
-  const absl::StatusOr<std::string> bytes = ReadRegularFile(file, kMaxBytes, "a picture");
+absl::StatusOr<DecodedPicture> LoadPicture(const std::filesystem::path& file,
+                                           const SizeCheck& check) {
+  const absl::StatusOr<std::string> bytes =
+      ReadRegularFile(file, kMaxPictureFileBytes, "a picture");
   if (absl::IsNotFound(bytes.status()) || absl::IsResourceExhausted(bytes.status())) {
     return bytes.status();
   }
   if (!bytes.ok()) return absl::DataLossError(bytes.status().message());
-  absl::StatusOr<Picture> picture =
+  absl::StatusOr<DecodedPicture> picture =
       DecodePicture({reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()}, check);
   if (picture.ok()) return picture;
   return absl::Status(picture.status().code(),

@@ -12,7 +12,7 @@ namespace saccade {
 
 /// One decoded picture: `grey` CV_8UC1, never empty; `color` CV_8UC3 BGR, empty if the file is
 /// grey.
-struct Picture {
+struct DecodedPicture {
   cv::Mat grey;
   cv::Mat color;
 };
@@ -33,11 +33,11 @@ using SizeCheck = std::function<absl::Status(cv::Size)>;
 ///   DataLoss           truncated, damaged, not a regular file, not a picture, too large, not 8
 ///                      bits a channel, or no memory for it
 ///   ResourceExhausted  no file descriptor is free: the file may be well, try again later
-absl::StatusOr<Picture> LoadPicture(const std::filesystem::path& file,
-                                    const SizeCheck& check = nullptr);
+absl::StatusOr<DecodedPicture> LoadPicture(const std::filesystem::path& file,
+                                           const SizeCheck& check = nullptr);
 
 /// The same of bytes in memory. DataLoss.
-absl::StatusOr<Picture> DecodePicture(std::span<const std::uint8_t> bytes,
-                                      const SizeCheck& check = nullptr);
+absl::StatusOr<DecodedPicture> DecodePicture(std::span<const std::uint8_t> bytes,
+                                             const SizeCheck& check = nullptr);
 
 }  // namespace saccade

@@ -18,9 +18,9 @@ namespace saccade {
 namespace {
 
 constexpr std::size_t kMaxLine = 4096;
-constexpr std::size_t kMaxBytes = std::size_t{64} << 20;  // a million pictures: nine hours
+constexpr std::size_t kMaxListBytes = std::size_t{64} << 20;  // a million pictures: nine hours
 
-absl::Status At(const std::filesystem::path& file, int line, absl::string_view problem) {
+absl::Status AtLine(const std::filesystem::path& file, int line, absl::string_view problem) {
   return absl::InvalidArgumentError(absl::StrCat(file.string(), ":", line, ": ", problem));
 }
 
@@ -63,11 +63,11 @@ Timestamp MedianInterval(const std::vector<ImageEntry>& entries) {
 absl::Status CheckUnit(const std::filesystem::path& file, const std::vector<ImageEntry>& entries) {
   const Timestamp median_ns = MedianInterval(entries);
   if (median_ns < kUnlikely_ns) return absl::OkStatus();
-  return At(file, entries[1].line,
-            absl::StrCat("time stamps are in seconds, and these are ",
-                         absl::StrFormat("%.6g", Seconds(median_ns)),
-                         " s apart in the median, too far to follow a camera",
-                         UnitRemedy(Seconds(median_ns), Seconds(kUnlikely_ns), "this")));
+  return AtLine(file, entries[1].line,
+                absl::StrCat("time stamps are in seconds, and these are ",
+                             absl::StrFormat("%.6g", Seconds(median_ns)),
+                             " s apart in the median, too far to follow a camera",
+                             UnitRemedy(Seconds(median_ns), Seconds(kUnlikely_ns), "this")));
 }
 
 }  // namespace
@@ -107,7 +107,8 @@ absl::StatusOr<Timestamp> ParseSeconds(absl::string_view text) {
 }
 
 absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::path& file) {
-  const absl::StatusOr<std::string> list = ReadRegularFile(file, kMaxBytes, "a list of pictures");
+  const absl::StatusOr<std::string> list =
+      ReadRegularFile(file, kMaxListBytes, "a list of pictures");
   if (absl::IsNotFound(list.status())) {
     return absl::NotFoundError(absl::StrCat(
         file.string(), ": cannot be opened; a data set in TUM layout needs rgb.txt with ",
@@ -115,23 +116,24 @@ absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::pat
   }
   if (!list.ok()) return list.status();
   if (const std::string wrong = WhatIsWrongWithList(*list); !wrong.empty()) {
-    return At(file, 1, wrong);
+    return AtLine(file, 1, wrong);
   }
   std::vector<ImageEntry> entries;
   int line = 0;
   for (const absl::string_view text : absl::StrSplit(*list, '\n')) {
     ++line;
-    if (text.size() > kMaxLine) return At(file, line, "is too long; is this a text file?");
+    if (text.size() > kMaxLine) return AtLine(file, line, "is too long; is this a text file?");
     absl::string_view rest = text;
     if (line == 1) absl::ConsumePrefix(&rest, "\xEF\xBB\xBF");
     rest = absl::StripAsciiWhitespace(rest);
     if (rest.empty() || rest.front() == '#') continue;
     if (const std::string wrong = WhatIsWrongWithLine(rest); !wrong.empty()) {
-      return At(file, line, absl::StrCat(Quoted(rest), " ", wrong));
+      return AtLine(file, line, absl::StrCat(Quoted(rest), " ", wrong));
     }
     const std::size_t gap = rest.find_first_of(" \t");
     if (gap == absl::string_view::npos) {
-      return At(file, line, absl::StrCat(Quoted(rest), " has no file name; write `SECONDS FILE`"));
+      return AtLine(file, line,
+                    absl::StrCat(Quoted(rest), " has no file name; write `SECONDS FILE`"));
     }
     ImageEntry entry;
     entry.timestamp = std::string(rest.substr(0, gap));
@@ -140,11 +142,11 @@ absl::StatusOr<std::vector<ImageEntry>> LoadImageList(const std::filesystem::pat
     const absl::StatusOr<Timestamp> time = ParseSeconds(entry.timestamp);
     if (!time.ok()) {  // a count of nanoseconds from 0 ends in the year 2262 after nine seconds
       if (absl::Status unit = CheckUnit(file, entries); !unit.ok()) return unit;
-      return At(file, line, absl::StrCat(time.status().message(), "; write `SECONDS FILE`"));
+      return AtLine(file, line, absl::StrCat(time.status().message(), "; write `SECONDS FILE`"));
     }
     entry.time_ns = *time;
     if (!entries.empty() && entry.time_ns <= entries.back().time_ns) {
-      return At(
+      return AtLine(
           file, line,
           absl::StrCat("time stamp ", entry.timestamp, " is not after ", entries.back().timestamp,
                        " of line ", entries.back().line,

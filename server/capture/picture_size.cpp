@@ -12,7 +12,7 @@ std::optional<cv::Size> SizeOfFirstPicture(const std::filesystem::path& folder,
   constexpr std::uint64_t kTries = 50;
   const std::uint64_t end = std::min<std::uint64_t>(entries.size(), first + kTries);
   for (std::uint64_t i = first; i < end; ++i) {
-    const absl::StatusOr<Picture> picture = LoadPicture(folder / entries[i].file);
+    const absl::StatusOr<DecodedPicture> picture = LoadPicture(folder / entries[i].file);
     if (picture.ok()) return picture->grey.size();
   }
   return std::nullopt;

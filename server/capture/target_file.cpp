@@ -25,7 +25,7 @@ Eigen::Vector3d ToVector(const std::vector<double>& numbers) {
 }
 
 absl::Status ReadTemplate(const std::filesystem::path& file, cv::Mat* templ) {
-  absl::StatusOr<Picture> picture = LoadPicture(file);
+  absl::StatusOr<DecodedPicture> picture = LoadPicture(file);
   if (!picture.ok()) return picture.status();
   *templ = picture->grey;
   const int side = templ->cols;

@@ -43,7 +43,7 @@ Turn ReadTurn(UriQuery& query) {
   return turn;
 }
 
-Picture Turned(Picture picture, const Turn& turn) {
+DecodedPicture Turned(DecodedPicture picture, const Turn& turn) {
   if (turn.clockwise_deg == 0 && !turn.mirror) return picture;
   return {TurnedPlane(picture.grey, turn), TurnedPlane(picture.color, turn)};
 }

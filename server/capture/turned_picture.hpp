@@ -19,6 +19,6 @@ struct Turn {
 Turn ReadTurn(UriQuery& query);
 
 /// `picture` upright. The lens is that of the upright picture.
-Picture Turned(Picture picture, const Turn& turn);
+DecodedPicture Turned(DecodedPicture picture, const Turn& turn);
 
 }  // namespace saccade

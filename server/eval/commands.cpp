@@ -133,7 +133,7 @@ absl::Status ScoreCommand(const ScoreArguments& arguments) {
   const bool metric = arguments.align == "se3";
   const std::vector<PosePair> pairs = Associate(*estimate, *truth);
   const absl::StatusOr<TrajectoryScore> score =
-      Score(pairs, metric ? Alignment::kSe3 : Alignment::kSim3);
+      Score(pairs, metric ? TrajectoryAlignment::kSe3 : TrajectoryAlignment::kSim3);
   if (!score.ok()) {
     return absl::Status(score.status().code(),
                         absl::StrCat(arguments.estimate.string(), " against ",

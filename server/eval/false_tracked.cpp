@@ -21,7 +21,7 @@ double ErrorOf(const PosePair& pair, const Similarity& truth_from_estimate) {
 }
 
 Similarity AlignKept(const std::vector<PosePair>& pairs, const std::vector<bool>& kept,
-                     Alignment alignment) {
+                     TrajectoryAlignment alignment) {
   std::vector<Vector3d> estimate, truth;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (!kept[i]) continue;
@@ -33,7 +33,7 @@ Similarity AlignKept(const std::vector<PosePair>& pairs, const std::vector<bool>
 
 }  // namespace
 
-Similarity ConsensusAlignment(const std::vector<PosePair>& pairs, Alignment alignment) {
+Similarity ConsensusAlignment(const std::vector<PosePair>& pairs, TrajectoryAlignment alignment) {
   std::vector<bool> kept(pairs.size(), true);
   Similarity aligned = AlignKept(pairs, kept, alignment);
   for (int round = 0; round < kConsensusRounds; ++round) {
@@ -52,7 +52,8 @@ Similarity ConsensusAlignment(const std::vector<PosePair>& pairs, Alignment alig
   return aligned;
 }
 
-FalseTracked CountFalseTracked(const std::vector<PosePair>& tracked, Alignment alignment) {
+FalseTracked CountFalseTracked(const std::vector<PosePair>& tracked,
+                               TrajectoryAlignment alignment) {
   FalseTracked result;
   if (tracked.size() < 3) return result;
   const Similarity whole = ConsensusAlignment(tracked, alignment);
@@ -114,8 +115,9 @@ double RunningAlignment::Leverage(const Vector3d& point_in_truth) const {
   const Matrix3d moved = cross * turning.inverse() * cross.transpose();
   const double turned =
       Eigen::SelfAdjointEigenSolver<Matrix3d>(moved, Eigen::EigenvaluesOnly).eigenvalues()[2];
-  const double scaled =
-      alignment_ == Alignment::kSim3 ? p.squaredNorm() / (extent.trace() + kLeastExtent2_m2) : 0.0;
+  const double scaled = alignment_ == TrajectoryAlignment::kSim3
+                            ? p.squaredNorm() / (extent.trace() + kLeastExtent2_m2)
+                            : 0.0;
   return std::sqrt(1.0 + std::max(turned, scaled));
 }
 

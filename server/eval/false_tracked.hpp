@@ -35,15 +35,15 @@ struct FalseTracked {
 
 /// `tracked`: poses as published, in order of time. Lengths are compared with their scale where
 /// `alignment` is kSe3 (a metric map). Fewer than three poses: none is false.
-FalseTracked CountFalseTracked(const std::vector<PosePair>& tracked, Alignment alignment);
+FalseTracked CountFalseTracked(const std::vector<PosePair>& tracked, TrajectoryAlignment alignment);
 
 /// The alignment that most of `pairs` agrees with, see FalseTracked. At least one pair.
-Similarity ConsensusAlignment(const std::vector<PosePair>& pairs, Alignment alignment);
+Similarity ConsensusAlignment(const std::vector<PosePair>& pairs, TrajectoryAlignment alignment);
 
 /// Least-squares alignment over a growing set of positions; every call takes constant time.
 class RunningAlignment {
  public:
-  explicit RunningAlignment(Alignment alignment) : alignment_(alignment) {}
+  explicit RunningAlignment(TrajectoryAlignment alignment) : alignment_(alignment) {}
 
   void Add(const Eigen::Vector3d& estimate, const Eigen::Vector3d& truth);
   std::size_t size() const { return count_; }
@@ -54,7 +54,7 @@ class RunningAlignment {
   double Leverage(const Eigen::Vector3d& point_in_truth) const;
 
  private:
-  Alignment alignment_;
+  TrajectoryAlignment alignment_;
   std::size_t count_ = 0;
   // Relative to the first point: large coordinates would eat the digits of the products.
   Eigen::Vector3d first_estimate_ = Eigen::Vector3d::Zero(), first_truth_ = first_estimate_;

@@ -5,15 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "server/eval/outline.hpp"
 #include "server/eval/registration.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 Timestamp Ns(double seconds) { return static_cast<Timestamp>(std::llround(1e9 * seconds)); }
 

@@ -6,19 +6,18 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
-#include <numbers>
 #include <random>
 
 #include "server/eval/gaze_result.hpp"
 #include "server/eval/gaze_run.hpp"
 #include "server/eval/outline.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kStart_s = 2.2;  // on the chessboard, and the first features
 constexpr double kArrived_deg = 1.0;
 constexpr double kArrived_s = 0.2;
@@ -187,7 +186,7 @@ void MeasureDrift(GazeRun& run, double duration_s, GazeResult& result) {
     estimate.push_back(pair.estimate.translation);
     truth.push_back(pair.truth.translation);
   }
-  const Similarity aligned = AlignPoints(estimate, truth, Alignment::kSe3);
+  const Similarity aligned = AlignPoints(estimate, truth, TrajectoryAlignment::kSe3);
   Sample first, last;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const double squared = (aligned * estimate[k] - truth[k]).squaredNorm();

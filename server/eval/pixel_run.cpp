@@ -109,7 +109,7 @@ absl::StatusOr<std::optional<double>> PixelRun::Run(PixelRunTotals& totals) {
     if (!status.ok()) return status;
   }
   const absl::StatusOr<TrajectoryScore> score =
-      Score(Associate(recorder_.trajectory(), truth_), Alignment::kSe3);
+      Score(Associate(recorder_.trajectory(), truth_), TrajectoryAlignment::kSe3);
   const double scale = metric_ || !score.ok() ? 1.0 : score->scale;
   totals.claims.Add(claims_, scale);
   if (const absl::Status status = claims_.Write(folder_ / "claims.csv", scale); !status.ok()) {

@@ -105,7 +105,7 @@ absl::Status RunVariant(const PointsWorld& world, const PointsOptions& options,
     const absl::Status recorded = Record(*tracker, *step, i, world.dt_s, cost, *recorder);
     if (!recorded.ok()) return recorded;
   }
-  const absl::StatusOr<TrajectoryScore> score = Score(pairs, Alignment::kSe3);
+  const absl::StatusOr<TrajectoryScore> score = Score(pairs, TrajectoryAlignment::kSe3);
   if (score.ok()) {
     variant.ates_m.Add(score->ate_se3_m);
     variant.rotations_deg.Add(score->rotation_se3_deg);

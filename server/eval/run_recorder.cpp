@@ -30,7 +30,8 @@ void AddScaleAndFalse(const std::vector<PosePair>& pairs, bool metric, Json& rep
   report["scale_windows"] =
       windows ? Json{{"min", windows->min}, {"max", windows->max}, {"windows", windows->windows}}
               : Json(nullptr);
-  const FalseTracked wrong = CountFalseTracked(pairs, metric ? Alignment::kSe3 : Alignment::kSim3);
+  const FalseTracked wrong =
+      CountFalseTracked(pairs, metric ? TrajectoryAlignment::kSe3 : TrajectoryAlignment::kSim3);
   const bool known = pairs.size() >= 3;
   report["false_tracked_frames"] = known ? Json(wrong.frames) : Json(nullptr);
   report["false_tracked"] =
@@ -142,7 +143,7 @@ absl::Status RunRecorder::Close() {
 
 void AddScores(const std::vector<PosePair>& pairs, bool metric, Json& report) {
   const absl::StatusOr<TrajectoryScore> score =
-      Score(pairs, metric ? Alignment::kSe3 : Alignment::kSim3);
+      Score(pairs, metric ? TrajectoryAlignment::kSe3 : TrajectoryAlignment::kSim3);
   report["truth_frames"] = pairs.size();
   const auto put = [&](const char* key, std::optional<double> value) {
     report[key] = value ? Json(*value) : Json(nullptr);

@@ -15,7 +15,7 @@ double ScaleOf(const std::vector<PosePair>& pairs, std::size_t begin, std::size_
     estimate.push_back(pairs[i].estimate.translation);
     truth.push_back(pairs[i].truth.translation);
   }
-  return AlignPoints(estimate, truth, Alignment::kSim3).scale;
+  return AlignPoints(estimate, truth, TrajectoryAlignment::kSim3).scale;
 }
 
 }  // namespace

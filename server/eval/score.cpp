@@ -69,14 +69,14 @@ void AddRelativeErrors(const std::vector<PosePair>& pairs, double scale, Traject
 
 }  // namespace
 
-Similarity AlignMoments(const AlignmentMoments& moments, Alignment alignment) {
+Similarity AlignMoments(const AlignmentMoments& moments, TrajectoryAlignment alignment) {
   const Eigen::JacobiSVD<Matrix3d> svd(moments.covariance,
                                        Eigen::ComputeFullU | Eigen::ComputeFullV);
   Vector3d signs = Vector3d::Ones();
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs.z() = -1;
   const Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
   Similarity result;
-  if (alignment == Alignment::kSim3 && moments.source_variance > 1e-20) {
+  if (alignment == TrajectoryAlignment::kSim3 && moments.source_variance > 1e-20) {
     result.scale = svd.singularValues().dot(signs) / moments.source_variance;
   }
   result.target_from_source.rotation = Eigen::Quaterniond(rotation).normalized();
@@ -86,7 +86,7 @@ Similarity AlignMoments(const AlignmentMoments& moments, Alignment alignment) {
 }
 
 Similarity AlignPoints(const std::vector<Vector3d>& source, const std::vector<Vector3d>& target,
-                       Alignment alignment) {
+                       TrajectoryAlignment alignment) {
   AlignmentMoments moments = {Mean(source), Mean(target), Matrix3d::Zero(), 0};
   const double part = 1.0 / static_cast<double>(source.size());
   for (std::size_t i = 0; i < source.size(); ++i) {
@@ -110,7 +110,8 @@ std::vector<PosePair> Associate(const Trajectory& estimate, const Trajectory& tr
   return pairs;
 }
 
-absl::StatusOr<TrajectoryScore> Score(const std::vector<PosePair>& pairs, Alignment alignment) {
+absl::StatusOr<TrajectoryScore> Score(const std::vector<PosePair>& pairs,
+                                      TrajectoryAlignment alignment) {
   if (pairs.size() < 3) {
     return absl::FailedPreconditionError(
         absl::StrCat("only ", pairs.size(),
@@ -124,8 +125,8 @@ absl::StatusOr<TrajectoryScore> Score(const std::vector<PosePair>& pairs, Alignm
   }
   TrajectoryScore score;
   score.pairs = pairs.size();
-  const Errors se3 = AbsoluteErrors(pairs, AlignPoints(estimate, truth, Alignment::kSe3));
-  const Similarity sim3 = AlignPoints(estimate, truth, Alignment::kSim3);
+  const Errors se3 = AbsoluteErrors(pairs, AlignPoints(estimate, truth, TrajectoryAlignment::kSe3));
+  const Similarity sim3 = AlignPoints(estimate, truth, TrajectoryAlignment::kSim3);
   const Errors similar = AbsoluteErrors(pairs, sim3);
   score.ate_se3_m = se3.position_m;
   score.rotation_se3_deg = se3.rotation_rad * kDegrees;
@@ -136,7 +137,7 @@ absl::StatusOr<TrajectoryScore> Score(const std::vector<PosePair>& pairs, Alignm
   double squares = 0;
   for (const Vector3d& point : truth) squares += (point - still).squaredNorm();
   score.ate_null_m = std::sqrt(squares / static_cast<double>(truth.size()));
-  AddRelativeErrors(pairs, alignment == Alignment::kSim3 ? sim3.scale : 1.0, score);
+  AddRelativeErrors(pairs, alignment == TrajectoryAlignment::kSim3 ? sim3.scale : 1.0, score);
   return score;
 }
 

@@ -9,7 +9,7 @@
 
 namespace saccade {
 
-enum class Alignment { kSe3, kSim3 };
+enum class TrajectoryAlignment { kSe3, kSim3 };
 
 /// target = scale * rotation * source + translation.
 struct Similarity {
@@ -28,13 +28,13 @@ struct AlignmentMoments {
   Eigen::Matrix3d covariance;
   double source_variance = 0;
 };
-Similarity AlignMoments(const AlignmentMoments& moments, Alignment alignment);
+Similarity AlignMoments(const AlignmentMoments& moments, TrajectoryAlignment alignment);
 
 /// Least-squares alignment of point sets of the same size (at least one point).
 /// Source: Umeyama, "Least-squares estimation of transformation parameters between two point
 /// patterns", PAMI 13(4), 1991. Collinear points leave a rotation free: any one is taken.
 Similarity AlignPoints(const std::vector<Eigen::Vector3d>& source,
-                       const std::vector<Eigen::Vector3d>& target, Alignment alignment);
+                       const std::vector<Eigen::Vector3d>& target, TrajectoryAlignment alignment);
 
 /// The estimate's poses with the truth's at the same times.
 struct PosePair {
@@ -66,6 +66,7 @@ struct TrajectoryScore {
 
 /// `alignment` only chooses the lengths of the relative error: kSim3 for maps without a metric
 /// scale. FailedPrecondition: fewer than three pairs.
-absl::StatusOr<TrajectoryScore> Score(const std::vector<PosePair>& pairs, Alignment alignment);
+absl::StatusOr<TrajectoryScore> Score(const std::vector<PosePair>& pairs,
+                                      TrajectoryAlignment alignment);
 
 }  // namespace saccade

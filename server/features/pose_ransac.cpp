@@ -11,7 +11,7 @@
 namespace saccade {
 namespace {
 
-struct Sample {
+struct PoseSample {
   int index = 0;
   Eigen::Vector3d point;    // [m, world]
   Eigen::Vector3d bearing;  // unit, camera
@@ -22,10 +22,10 @@ Eigen::Vector3d ToEigen(const cv::Mat& m) {
 }
 
 /// camera_from_world hypotheses of three samples, up to four.
-std::vector<Rigid3> SolveP3p(const std::array<const Sample*, 3>& samples) {
+std::vector<Rigid3> SolveP3p(const std::array<const PoseSample*, 3>& samples) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> rays;
-  for (const Sample* sample : samples) {
+  for (const PoseSample* sample : samples) {
     points.emplace_back(sample->point.x(), sample->point.y(), sample->point.z());
     rays.emplace_back(sample->bearing.x() / sample->bearing.z(),
                       sample->bearing.y() / sample->bearing.z());
@@ -45,11 +45,11 @@ std::vector<Rigid3> SolveP3p(const std::array<const Sample*, 3>& samples) {
   return poses;
 }
 
-int CountInliers(const std::vector<Sample>& samples, const Rigid3& camera_from_world,
+int CountInliers(const std::vector<PoseSample>& samples, const Rigid3& camera_from_world,
                  double cosine) {
   const Eigen::Matrix3d rotation = camera_from_world.RotationMatrix();
   int count = 0;
-  for (const Sample& sample : samples) {
+  for (const PoseSample& sample : samples) {
     const Eigen::Vector3d point = rotation * sample.point + camera_from_world.translation;
     const double along = point.dot(sample.bearing);
     count += along > 0 && along * along > cosine * cosine * point.squaredNorm() ? 1 : 0;
@@ -113,7 +113,7 @@ absl::StatusOr<RansacPose> FitPoseRansac(const CameraModel& camera,
   if (points_in_world.size() != pixels.size()) {
     return absl::InvalidArgumentError("pose: as many points as pixels are needed");
   }
-  std::vector<Sample> samples;
+  std::vector<PoseSample> samples;
   for (std::size_t k = 0; k < pixels.size(); ++k) {
     if (!points_in_world[k].allFinite() || !pixels[k].allFinite()) continue;
     const auto ray = camera.Unproject(pixels[k]);

@@ -7,10 +7,11 @@
 #include <cmath>
 #include <utility>
 
+#include "shared/geometry/angle.hpp"
+
 namespace saccade {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kMaxStep_s = 0.05;
 // By how much a pose may differ from the expected one, at once and for each second since the last:
 // beyond any wearer's acceleration.
@@ -20,7 +21,9 @@ constexpr double kLongestSaccade_s = 2.0;    // encoders and the wearer's inerti
 constexpr double kCatchUp = 1.02;            // of the rate limit, for servos that lag behind
 constexpr Timestamp kRateSpan = 20'000'000;  // over which a moving goal's rate is taken
 
-Timestamp Ns(double seconds) { return static_cast<Timestamp>(std::llround(1e9 * seconds)); }
+Timestamp Nanoseconds(double seconds) {
+  return static_cast<Timestamp>(std::llround(1e9 * seconds));
+}
 
 bool LooksAtTarget(GazeMode mode) {
   return mode == GazeMode::kSaccade || mode == GazeMode::kFixate || mode == GazeMode::kExplore;
@@ -191,7 +194,7 @@ std::optional<GazeController::Goal> GazeController::MovingGoal(Timestamp now_ns)
     }
     return std::nullopt;
   }
-  const Timestamp effect_ns = now_ns + Ns(Horizon_s());
+  const Timestamp effect_ns = now_ns + Nanoseconds(Horizon_s());
   const MountAngles near = ToAngles({axes_[0].angle, axes_[1].angle, axes_[2].angle});
   const std::optional<FixationAngles> here = AnglesFor(effect_ns, near);
   if (!here) return std::nullopt;
@@ -261,11 +264,11 @@ MountDemand GazeController::Step(Timestamp now_ns, const std::optional<EncoderRe
     demand.rate_limits_rad_s(k) = kCatchUp * LimitsOf(k).rate;
   }
   report_.world_from_view.reset();
-  if (const std::optional<Rigid3> wearer = wearer_.At(now_ns + Ns(Horizon_s()))) {
+  if (const std::optional<Rigid3> wearer = wearer_.At(now_ns + Nanoseconds(Horizon_s()))) {
     report_.world_from_view =
         wearer->rotation * model_.MountFromCamera(ToAngles(demand.angles_rad)).rotation;
   }
-  sent_.push_back({now_ns + Ns(model_.options().command_latency_s), demand.angles_rad});
+  sent_.push_back({now_ns + Nanoseconds(model_.options().command_latency_s), demand.angles_rad});
   WatchFollowing(now_ns, encoder);
   Judge(now_ns, encoder);
   return demand;

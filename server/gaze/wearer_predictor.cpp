@@ -5,10 +5,10 @@
 namespace saccade {
 namespace {
 
-constexpr double kMaxHorizon_s = 0.3;    // further than this nobody knows
-constexpr double kAccelerates_s = 0.12;  // then goes on at the rate it has
-constexpr std::size_t kFewest = 8;       // poses, if there are so many...
-constexpr double kLongest = 3.0;         // ...in so many windows
+constexpr double kMaxHorizon_s = 0.3;        // further than this nobody knows
+constexpr double kAccelerates_s = 0.12;      // then goes on at the rate it has
+constexpr std::size_t kFewestPredicted = 8;  // poses, if there are so many...
+constexpr double kLongest = 3.0;             // ...in so many windows
 
 }  // namespace
 
@@ -20,7 +20,7 @@ void WearerPredictor::Add(Timestamp time_ns, const Rigid3& world_from_mount) {
   poses_.push_back({time_ns, world_from_mount});
   // After a gap (a fast saccade) what was before it says more of the rate than two poses since.
   while (Seconds(time_ns - poses_.front().time_ns) > window_s_ &&
-         (poses_.size() > kFewest ||
+         (poses_.size() > kFewestPredicted ||
           Seconds(time_ns - poses_.front().time_ns) > kLongest * window_s_)) {
     poses_.pop_front();
   }

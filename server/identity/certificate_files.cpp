@@ -20,9 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kDay_s = 86'400;
-constexpr std::int64_t kRenew_s = 30 * kDay_s;
-constexpr std::int64_t kSayAuthority_s = 60 * kDay_s, kSayGiven_s = 14 * kDay_s;
+constexpr std::int64_t kSecondsADay = 86'400;
+constexpr std::int64_t kRenew_s = 30 * kSecondsADay;
+constexpr std::int64_t kSayAuthority_s = 60 * kSecondsADay, kSayGiven_s = 14 * kSecondsADay;
 constexpr std::size_t kMaxPemBytes = 256 * 1024;
 
 absl::StatusOr<CertificateAndKey> Read(const fs::path& certificate, const fs::path& key) {
@@ -136,7 +136,7 @@ std::string ExpiryWarning(const ServerIdentity& identity, std::int64_t now_unix_
   const std::string day = absl::FormatTime(
       "%Y-%m-%d", absl::FromUnixSeconds(facts->not_after_unix_s), absl::UTCTimeZone());
   if (own) {
-    const std::int64_t days = std::max<std::int64_t>(0, (left_s - kRenew_s) / kDay_s);
+    const std::int64_t days = std::max<std::int64_t>(0, (left_s - kRenew_s) / kSecondsADay);
     return absl::StrCat(
         "tls: this server's authority ends on ", day, "; in ", days,
         " days a new one is made, which everybody has to trust anew (/trust, "
@@ -147,7 +147,7 @@ std::string ExpiryWarning(const ServerIdentity& identity, std::int64_t now_unix_
     return absl::StrCat("tls: the given certificate ended on ", day,
                         ": nobody can connect; put a new one in its place, it is taken up at once");
   }
-  return absl::StrCat("tls: the given certificate ends on ", day, ", in ", left_s / kDay_s,
+  return absl::StrCat("tls: the given certificate ends on ", day, ", in ", left_s / kSecondsADay,
                       " days; put a new one in its place, it is taken up at once");
 }
 

@@ -21,7 +21,7 @@ absl::Status No(absl::string_view claim, absl::string_view why) {
   return absl::UnauthenticatedError(absl::StrCat("id_token: ", claim, ": ", why));
 }
 
-std::optional<std::string> Text(const json& claims, const char* name) {
+std::optional<std::string> TextClaim(const json& claims, const char* name) {
   const auto at = claims.find(name);
   if (at == claims.end() || !at->is_string()) return std::nullopt;
   return at->get<std::string>();
@@ -58,7 +58,7 @@ absl::Status CheckAudience(const json& claims, const IdTokenRules& rules) {
   if (!whole || all.empty() || !std::all_of(all.begin(), all.end(), known)) {
     return No("aud", "is for somebody else");
   }
-  if (claims.contains("azp") && !known(Text(claims, "azp").value_or(""))) {
+  if (claims.contains("azp") && !known(TextClaim(claims, "azp").value_or(""))) {
     return No("azp", "was given to somebody else");
   }
   return absl::OkStatus();
@@ -92,7 +92,7 @@ std::string Cut(std::string text, std::size_t most) {
 
 std::string NameOf(const json& claims, const std::string& subject) {
   for (const char* claim : {"name", "preferred_username", "email"}) {
-    const std::string text(absl::StripAsciiWhitespace(Text(claims, claim).value_or("")));
+    const std::string text(absl::StripAsciiWhitespace(TextClaim(claims, claim).value_or("")));
     if (!text.empty()) return Cut(text, kMaxNameBytes);
   }
   return Cut(subject, kMaxNameBytes);
@@ -115,15 +115,15 @@ absl::StatusOr<IdTokenClaims> CheckClaims(absl::string_view payload, const IdTok
                                           std::int64_t now_unix_s) {
   const json claims = json::parse(payload, nullptr, /*allow_exceptions=*/false);
   if (!claims.is_object()) return No("payload", "is no JSON object");
-  if (Text(claims, "iss") != rules.issuer) return No("iss", "is by another issuer");
+  if (TextClaim(claims, "iss") != rules.issuer) return No("iss", "is by another issuer");
   if (absl::Status audience = CheckAudience(claims, rules); !audience.ok()) return audience;
   IdTokenClaims told;
   absl::Status times = CheckTimes(claims, now_unix_s, told.expires_unix_s);
   if (!times.ok()) return times;
-  if (!rules.nonce.empty() && Text(claims, "nonce") != rules.nonce) {
+  if (!rules.nonce.empty() && TextClaim(claims, "nonce") != rules.nonce) {
     return No("nonce", "is of another sign-in");
   }
-  told.subject = Text(claims, "sub").value_or("");
+  told.subject = TextClaim(claims, "sub").value_or("");
   if (told.subject.empty() || told.subject.size() > kMaxSubjectBytes) {
     return No("sub", "says nobody");
   }

@@ -14,7 +14,7 @@ constexpr int kMostPoints = 700;
 constexpr std::size_t kFewestSights = 2;  // of a point besides its first: less says nothing
 
 template <typename Rising>
-int IndexOf(const Rising& rising, KeyframeId id) {
+int PositionOf(const Rising& rising, KeyframeId id) {
   const auto at = std::lower_bound(rising.begin(), rising.end(), id);
   return at != rising.end() && *at == id ? static_cast<int>(at - rising.begin()) : -1;
 }
@@ -52,7 +52,7 @@ KeyframeGraph::LensJob KeyframeGraph::MakeLensJob(const CameraModel& lens,
     const Point& point = points_.at(id);
     const GraphEstimate now = estimate(id).value_or(point.estimate);
     const auto seen = lens.Project(point.birth.bearing);
-    const int anchor = IndexOf(job.keyframes, point.anchor);
+    const int anchor = PositionOf(job.keyframes, point.anchor);
     if (anchor < 0 || !seen || !(now.inverse_range > 0.0)) continue;
     index[id] = static_cast<int>(job.points.size());
     job.points.push_back(id);

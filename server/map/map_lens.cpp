@@ -4,7 +4,7 @@
 namespace saccade {
 namespace {
 
-constexpr std::size_t kFewestKeyframes = 6;
+constexpr std::size_t kFewestKeyframesForLens = 6;
 
 /// As seen through the new lens what was seen on `ray` through the old one; `ray` where one of them
 /// has no place for it.
@@ -19,7 +19,7 @@ Eigen::Vector3d Reray(const CameraModel& before, const CameraModel& after,
 
 std::optional<KeyframeGraph::LensJob> Map::MakeLensJob(const CameraModel& lens,
                                                        const FilterState& filter) const {
-  if (keyframes_.size() < kFewestKeyframes) return std::nullopt;
+  if (keyframes_.size() < kFewestKeyframesForLens) return std::nullopt;
   return keyframes_.MakeLensJob(lens, [&](FeatureId id) -> std::optional<GraphEstimate> {
     if (!filter.Has(id)) return std::nullopt;
     const PointFromClone point = filter.Point(id);

@@ -18,7 +18,7 @@ constexpr double kBehind = 1e-3;     // cosine below which a ray is not seen
 constexpr double kLossSigmas = 1.0;  // matches' sigmas are set with a margin
 constexpr double kRangeShare = 2.0;  // sigma of the guess of an inverse range, of the median
 constexpr int kIterations = 30;
-constexpr int kFewestPoints = 12, kFewestKeyframes = 3;
+constexpr int kFewestStartPoints = 12, kFewestStartKeyframes = 3;
 
 /// Tangent coordinates of a direction (any length) around a measured ray, in sigmas.
 struct RayError {
@@ -225,8 +225,8 @@ std::vector<Attempt> Attempts(const StartProblem& problem, const std::atomic<boo
 
 std::optional<StartSolution> SolveStart(const StartProblem& problem,
                                         const std::atomic<bool>& stop) {
-  if (std::ssize(problem.world_from_camera) < kFewestKeyframes ||
-      std::ssize(problem.points) < kFewestPoints || problem.sightings.empty()) {
+  if (std::ssize(problem.world_from_camera) < kFewestStartKeyframes ||
+      std::ssize(problem.points) < kFewestStartPoints || problem.sightings.empty()) {
     return std::nullopt;
   }
   const std::vector<Attempt> attempts = Attempts(problem, stop);

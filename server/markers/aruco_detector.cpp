@@ -36,8 +36,8 @@ constexpr std::array kKnown = {
 };
 // Of corners that no lines were found for: OpenCV's own are drawn inwards.
 constexpr double kKeptVariance_px2 = 0.5 * 0.5;
-constexpr double kEnlarged = 2.0;
-constexpr int kMostEnlargedPixels = 3'000'000;
+constexpr double kArucoEnlarged = 2.0;
+constexpr int kMostArucoPixels = 3'000'000;
 
 }  // namespace
 
@@ -111,8 +111,8 @@ std::vector<MarkerSighting> ArucoDetector::Detect(const cv::Mat& grey) {
   std::vector<MarkerSighting> found;
   if (grey.empty() || grey.type() != CV_8UC1) return found;
   Look(grey, 1.0, found);
-  if (kEnlarged * kEnlarged * grey.cols * grey.rows <= kMostEnlargedPixels) {
-    Look(grey, kEnlarged, found);
+  if (kArucoEnlarged * kArucoEnlarged * grey.cols * grey.rows <= kMostArucoPixels) {
+    Look(grey, kArucoEnlarged, found);
   }
   DropGuesses(found);
   for (MarkerSighting& sighting : found) RefineCorners(grey, 0, kKeptVariance_px2, sighting);

@@ -15,7 +15,7 @@ namespace {
 constexpr int kIterations = 40;
 constexpr double kConverged_px = 0.003;
 // What a lens file, a printer and a pixel's own shape leave of the best corner [px^2].
-constexpr double kLeastVariance_px2 = 0.04 * 0.04;
+constexpr double kLeastCornerVariance_px2 = 0.04 * 0.04;
 // Of a pixel's grey value, with what sampling between pixels adds.
 constexpr double kNoise = 4.0;
 // A corner of line fits that could not be looked at more closely.
@@ -31,7 +31,7 @@ constexpr int kRingPoints = 32;
 constexpr double kLeastContrast = 20;
 
 /// Grey value between pixels.
-double At(const cv::Mat& grey, double x, double y) {
+double GreyAt(const cv::Mat& grey, double x, double y) {
   const int left = static_cast<int>(std::floor(x)), top = static_cast<int>(std::floor(y));
   const double a = x - left, b = y - top;
   const auto* upper = grey.ptr<std::uint8_t>(top) + left;
@@ -51,15 +51,15 @@ std::optional<double> VarianceAt(const cv::Mat& grey, const Eigen::Vector2d& pix
   for (int dy = -reach; dy <= reach; ++dy) {
     for (int dx = -reach; dx <= reach; ++dx) {
       const double x = pixel.x() + dx, y = pixel.y() + dy;
-      const Eigen::Vector2d gradient(0.5 * (At(grey, x + 1, y) - At(grey, x - 1, y)),
-                                     0.5 * (At(grey, x, y + 1) - At(grey, x, y - 1)));
+      const Eigen::Vector2d gradient(0.5 * (GreyAt(grey, x + 1, y) - GreyAt(grey, x - 1, y)),
+                                     0.5 * (GreyAt(grey, x, y + 1) - GreyAt(grey, x, y - 1)));
       tensor +=
           std::exp(-(dx * dx + dy * dy) / (2 * width * width)) * gradient * gradient.transpose();
     }
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(tensor);
   if (!(axes.eigenvalues()[0] > 1.0)) return std::nullopt;
-  return kLeastVariance_px2 + kNoise * kNoise / axes.eigenvalues()[0];
+  return kLeastCornerVariance_px2 + kNoise * kNoise / axes.eigenvalues()[0];
 }
 
 }  // namespace
@@ -90,8 +90,8 @@ bool IsSaddle(const cv::Mat& grey, const Eigen::Vector2d& pixel, double radius_p
   std::array<double, kRingPoints> ring;
   for (int k = 0; k < kRingPoints; ++k) {
     const double angle = 2 * std::numbers::pi * k / kRingPoints;
-    ring[k] =
-        At(grey, pixel.x() + radius_px * std::cos(angle), pixel.y() + radius_px * std::sin(angle));
+    ring[k] = GreyAt(grey, pixel.x() + radius_px * std::cos(angle),
+                     pixel.y() + radius_px * std::sin(angle));
   }
   const auto [low, high] = std::minmax_element(ring.begin(), ring.end());
   if (*high - *low < kLeastContrast) return false;

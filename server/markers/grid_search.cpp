@@ -21,7 +21,7 @@ constexpr int kTrials = 2000;
 constexpr double kLeastSide_px = 9.0;
 constexpr double kEdge_px = 5.0;
 constexpr int kMostWrongBits = 5;  // 36h11 differ in eleven
-constexpr double kLeastContrast = 20;
+constexpr double kLeastGridContrast = 20;
 
 using Corners = std::map<int, std::array<Eigen::Vector2d, 4>>;
 
@@ -144,7 +144,7 @@ std::optional<int> WrongBits(const cv::Mat& grey, const TagFamily& family, int i
       static_cast<double>(values.size() - coded);
   const double bright =
       *std::max_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(coded));
-  if (bright - dark < kLeastContrast) return std::nullopt;
+  if (bright - dark < kLeastGridContrast) return std::nullopt;
   int wrong = 0;
   for (std::size_t k = 0; k < coded; ++k) {
     wrong += (values[k] > 0.5 * (dark + bright)) != bits[k].bright;

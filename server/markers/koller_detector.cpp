@@ -19,7 +19,7 @@ namespace {
 // How far up from a puddle's bottom its border is, of its depth: the middle, and for squares that a
 // shadow, glare or something else lies across, lower and higher.
 constexpr std::array kLevels = {0.5, 0.3, 0.7, 0.2};
-constexpr double kReachOfSide = 0.06, kLeastReach_px = 2, kMostReach_px = 4;
+constexpr double kKollerReachOfSide = 0.06, kLeastKollerReach_px = 2, kMostKollerReach_px = 4;
 constexpr double kLeastSupport = 0.5;
 
 double ShortestOf(const std::array<Eigen::Vector2d, 4>& corners) {
@@ -47,8 +47,8 @@ struct Channels {
 absl::StatusOr<MarkerSighting> Read(const cv::Mat& color, const Channels& channels,
                                     const SquareRegion& region) {
   BorderFitOptions options;
-  options.reach_px =
-      std::clamp(kReachOfSide * ShortestOf(region.corners), kLeastReach_px, kMostReach_px);
+  options.reach_px = std::clamp(kKollerReachOfSide * ShortestOf(region.corners),
+                                kLeastKollerReach_px, kMostKollerReach_px);
   options.least_support = kLeastSupport;
   const std::optional<BorderFit> fit = FitBorder(channels.green, region.corners, options);
   if (!fit) return absl::NotFoundError("a side is not straight, or covered");

@@ -14,14 +14,14 @@ using Color = Eigen::Vector3d;  // blue, green, red
 
 constexpr double kBand = kKollerFrame / 2;  // where the frame is looked at
 constexpr double kOutside = 0.09, kLeastOutside_px = 2.2;
-constexpr double kLeastContrast = 15;
+constexpr double kLeastCellContrast = 15;
 constexpr int kLeastClearBands = 8;  // of twelve: something may lie over the others
 constexpr double kLeastRedness = 28;
 constexpr double kMostFrameRedness = 0.3;
 // Outside of the frame it is brighter than in it, by so much of the contrast, in shadow too.
 constexpr double kLeastWhite = 0.24;
 // Brighter than the frame near by, of the contrast to white: covered, or in glare.
-constexpr double kBlackTolerance = 0.16, kRedTolerance = 0.35, kNoise = 5;
+constexpr double kBlackTolerance = 0.16, kRedTolerance = 0.35, kCellNoise = 5;
 // A reflection brightens cells, too, but bends nowhere as sharply as the edge of what covers one:
 // of its height, over an eighth of the side to either hand. Only squares so large are looked at.
 constexpr double kMostGlare = 0.75, kMostBend = 0.8, kLeastBend = 0.1, kBendNoise = 4;
@@ -56,7 +56,7 @@ struct Band {
   double u, v;  // where along the frame
   Color inner, outer;
   double darkest;  // outside, of blue and green: of three places the least
-  bool clear() const { return outer[1] - inner[1] >= kLeastContrast; }
+  bool clear() const { return outer[1] - inner[1] >= kLeastCellContrast; }
 };
 
 double Redness(const Color& color) { return color[2] - std::max(color[0], color[1]); }
@@ -230,7 +230,7 @@ class Reader {
                                 kKollerFrame + (cell / 3 + 0.5) * kKollerCell);
     const Color more = color - black;
     const double above = more.head<2>().maxCoeff();
-    if (above > (red ? kRedTolerance : kBlackTolerance) * contrast_ + kNoise &&
+    if (above > (red ? kRedTolerance : kBlackTolerance) * contrast_ + kCellNoise &&
         (above > kMostGlare * contrast_ || !IsSmooth(above))) {
       return absl::InvalidArgumentError(absl::StrCat(name, " is covered, or in glare"));
     }

@@ -17,10 +17,10 @@ constexpr double kCornerShare = 0.14;   // of a side, at its ends, where two edg
 constexpr double kGate = 3.0;           // sigmas
 constexpr double kLeastRange_px = 2.5;  // lens and print are never exact
 constexpr double kMostRange_px = 20.0;
-constexpr double kBorderShare = 0.28;  // of a side: further in, the code has edges of its own
-constexpr double kLeastStep = 6.0;     // grey levels a pixel, at the edge
-constexpr double kLeastShare = 0.6;    // of a line's samples, that must agree
-constexpr double kSigma_px = 0.05;     // of one sample: what paper, lens and JPEG leave
+constexpr double kBorderShare = 0.28;      // of a side: further in, the code has edges of its own
+constexpr double kLeastSquareStep = 6.0;   // grey levels a pixel, at the edge
+constexpr double kLeastSquareShare = 0.6;  // of a line's samples, that must agree
+constexpr double kSigma_px = 0.05;         // of one sample: what paper, lens and JPEG leave
 constexpr double kOutlier_px = 0.6;
 constexpr double kShortest_px = 12.0;  // of a side
 constexpr int kCells = 7;              // a side, at which a square's inside is looked at
@@ -71,7 +71,7 @@ std::optional<double> FindStep(const cv::Mat& grey, int x, int y, int dx, int dy
     const bool peak = slope[k] >= slope[k - 1] && slope[k] > slope[k + 1];
     if (peak && (best == 0 || slope[k] > slope[best])) best = k;
   }
-  if (best == 0 || slope[best] < kLeastStep) return std::nullopt;
+  if (best == 0 || slope[best] < kLeastSquareStep) return std::nullopt;
   const double left = slope[best - 1], middle = slope[best], right = slope[best + 1];
   const double bend = left - 2.0 * middle + right;
   strength = middle;
@@ -89,8 +89,8 @@ struct Line {
 };
 
 std::optional<Line> FitLine(std::vector<Vector2d> points, int wanted) {
-  const auto fewest =
-      static_cast<std::size_t>(std::max(3.0, std::ceil(kLeastShare * static_cast<double>(wanted))));
+  const auto fewest = static_cast<std::size_t>(
+      std::max(3.0, std::ceil(kLeastSquareShare * static_cast<double>(wanted))));
   Line line;
   while (points.size() >= fewest) {
     Vector2d mean = Vector2d::Zero();

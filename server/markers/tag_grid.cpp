@@ -10,7 +10,7 @@ namespace saccade {
 namespace {
 
 constexpr int kMostTags = 500;  // 36h11 has 587 codes
-constexpr double kLeastSide_m = 0.001, kMostSide_m = 10.0;
+constexpr double kLeastTag_m = 0.001, kMostSide_m = 10.0;
 
 }  // namespace
 
@@ -29,7 +29,7 @@ absl::StatusOr<TagGrid> LoadTagGrid(const std::filesystem::path& file) {
   }
   grid.columns = reader.Integer("tagCols", 1, kMostTags);
   grid.rows = reader.Integer("tagRows", 1, kMostTags);
-  grid.side_m = reader.Number("tagSize", {kLeastSide_m, kMostSide_m});
+  grid.side_m = reader.Number("tagSize", {kLeastTag_m, kMostSide_m});
   grid.spacing = reader.Number("tagSpacing", {0, 10});
   if (reader.ok() && grid.tags() > kMostTags) {
     reader.Fail("tagRows", absl::StrCat("makes more than ", kMostTags, " tags"));
@@ -49,7 +49,7 @@ absl::StatusOr<TagGrid> ParseTagGrid(const std::string& text) {
            absl::SimpleAtod(parts[2], &grid.spacing);
   }
   if (good && grid.columns > 0 && grid.rows > 0 && grid.columns <= kMostTags &&
-      grid.rows <= kMostTags && grid.tags() <= kMostTags && grid.side_m >= kLeastSide_m &&
+      grid.rows <= kMostTags && grid.tags() <= kMostTags && grid.side_m >= kLeastTag_m &&
       grid.side_m <= kMostSide_m && grid.spacing >= 0 && grid.spacing <= 10) {
     return grid;
   }

@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "shared/geometry/angle.hpp"
 #include "shared/io/option_table.hpp"
 #include "shared/io/toml_table.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr const char* kNames[] = {"pan", "elevation", "cyclotorsion"};
 constexpr double kMaxOffset_m = 1.0;
 

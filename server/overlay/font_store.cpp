@@ -14,7 +14,7 @@ namespace {
 constexpr FT_Pos kUnit = 64;           // of a pixel
 constexpr FT_Pos kEmboldenShare = 24;  // of the size: no thin type, where a font has no bold
 
-GlyphPicture Picture(const FT_GlyphSlot slot, double scale) {
+GlyphPicture PictureOf(const FT_GlyphSlot slot, double scale) {
   const FT_Bitmap& bitmap = slot->bitmap;
   GlyphPicture picture{{}, slot->bitmap_left, slot->bitmap_top};
   if (bitmap.width == 0 || bitmap.rows == 0 || bitmap.pitch <= 0) return picture;
@@ -111,7 +111,7 @@ GlyphPicture FontStore::Draw(std::size_t font, std::uint32_t glyph, int size_px,
     FT_Outline_Translate(&slot->outline, std::lround(shift_px * kUnit), 0);
   }
   if (FT_Render_Glyph(slot, FT_RENDER_MODE_NORMAL) != 0) return {};
-  return Picture(slot, face->picture_scale);
+  return PictureOf(slot, face->picture_scale);
 }
 
 }  // namespace saccade

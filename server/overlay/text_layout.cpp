@@ -10,7 +10,7 @@
 namespace saccade {
 namespace {
 
-constexpr double kUnit = 64.0;        // HarfBuzz's, of a pixel
+constexpr double kGlyphUnit = 64.0;   // HarfBuzz's, of a pixel
 constexpr double kBoxAdvance = 0.62;  // of a character without a font, in ems
 
 using Buffer = std::unique_ptr<hb_buffer_t, decltype(&hb_buffer_destroy)>;
@@ -112,9 +112,9 @@ void Shape(FontStore& fonts, const Characters& all, const LayoutOptions& options
   const hb_glyph_info_t* info = hb_buffer_get_glyph_infos(buffer.get(), &count);
   const hb_glyph_position_t* at = hb_buffer_get_glyph_positions(buffer.get(), &count);
   for (unsigned i = 0; i < count; ++i) {
-    run.glyphs.push_back(
-        {font, info[i].codepoint, run.width_px + at[i].x_offset / kUnit, -at[i].y_offset / kUnit});
-    const double advance_px = at[i].x_advance / kUnit;
+    run.glyphs.push_back({font, info[i].codepoint, run.width_px + at[i].x_offset / kGlyphUnit,
+                          -at[i].y_offset / kGlyphUnit});
+    const double advance_px = at[i].x_advance / kGlyphUnit;
     const std::size_t character = info[i].cluster - run.begin;
     if (character < run.advance_px.size()) run.advance_px[character] += advance_px;
     run.width_px += advance_px;

@@ -77,7 +77,7 @@ absl::Status CheckMirror(const Points& model, const Points& map, bool with_scale
 
 }  // namespace
 
-absl::StatusOr<Registration> Register(std::span<const Correspondence> pairs,
+absl::StatusOr<Registration> Register(std::span<const PointPair> pairs,
                                       const RegistrationOptions& options) {
   if (pairs.size() < kLeastPairs) {
     return absl::InvalidArgumentError(

@@ -11,7 +11,7 @@
 namespace saccade {
 
 /// The same point in a model and in the map.
-struct Correspondence {
+struct PointPair {
   Eigen::Vector3d point_in_model = Eigen::Vector3d::Zero();  // [m]
   Eigen::Vector3d point_in_map = Eigen::Vector3d::Zero();    // [m, or the map's own unit]
 };
@@ -35,7 +35,7 @@ struct RegistrationOptions {
 ///   InvalidArgument     fewer than four, or not finite; names the index
 ///   FailedPrecondition  points in one place or on one line, in the model or in the map, also once
 ///                       any one of them is left out; or the map shows the model mirrored
-absl::StatusOr<Registration> Register(std::span<const Correspondence> pairs,
+absl::StatusOr<Registration> Register(std::span<const PointPair> pairs,
                                       const RegistrationOptions& options = {});
 
 }  // namespace saccade

@@ -80,7 +80,7 @@ void Fill(cv::Mat& image, const cv::Rect& area, const cv::Scalar& color) {
   cv::rectangle(image, area, color, cv::FILLED);
 }
 
-void Frame(cv::Mat& image, const cv::Rect& area, const cv::Scalar& color, int thickness) {
+void DrawFrame(cv::Mat& image, const cv::Rect& area, const cv::Scalar& color, int thickness) {
   cv::rectangle(image, area, color, thickness, cv::LINE_AA);
 }
 

@@ -26,7 +26,7 @@ void Text(cv::Mat& image, const std::string& text, const cv::Point& at, double h
 /// Lines of imitation text in `area`: words as short strokes of `line` pixels height.
 void Lines(cv::Mat& image, cv::RNG& rng, const cv::Rect& area, int line, const cv::Scalar& color);
 void Fill(cv::Mat& image, const cv::Rect& area, const cv::Scalar& color);
-void Frame(cv::Mat& image, const cv::Rect& area, const cv::Scalar& color, int thickness = 1);
+void DrawFrame(cv::Mat& image, const cv::Rect& area, const cv::Scalar& color, int thickness = 1);
 /// A soft dark rim just outside `area`, as a raised thing throws.
 void DropShadow(cv::Mat& image, const cv::Rect& area, int reach, double strength);
 

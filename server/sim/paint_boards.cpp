@@ -162,7 +162,7 @@ cv::Mat PaintCork(std::uint64_t seed) {
     cv::circle(image, {note.x + note.width / 2 - 2, note.y + 6}, 2, Rgb(255, 255, 255), cv::FILLED,
                cv::LINE_AA);
   }
-  Frame(image, {4, 4, 631, 471}, Rgb(120, 84, 52), 12);
+  DrawFrame(image, {4, 4, 631, 471}, Rgb(120, 84, 52), 12);
   return image;
 }
 
@@ -183,7 +183,7 @@ cv::Mat PaintPegboard(std::uint64_t seed) {
     Tool(image, {78 + 120 * k + rng.uniform(-8, 9), 350 + rng.uniform(0, 24)}, lower[k],
          grips[rng.uniform(0, 6)]);
   }
-  Frame(image, {2, 2, 875, 635}, Rgb(120, 92, 58), 8);
+  DrawFrame(image, {2, 2, 875, 635}, Rgb(120, 92, 58), 8);
   return image;
 }
 

@@ -11,7 +11,7 @@ constexpr int kWidth = 600, kHeight = 840;  // posters of 50 x 70 cm
 
 cv::Mat Sheet(const cv::Scalar& color) { return {kHeight, kWidth, CV_8UC3, color}; }
 
-void Polygon(cv::Mat& image, const std::vector<cv::Point>& points, const cv::Scalar& color) {
+void PrintPolygon(cv::Mat& image, const std::vector<cv::Point>& points, const cv::Scalar& color) {
   cv::fillPoly(image, std::vector<std::vector<cv::Point>>{points}, color, cv::LINE_AA);
 }
 
@@ -20,9 +20,10 @@ void Pictogram(cv::Mat& image, const cv::Point& at, int kind) {
   const cv::Point c = at + cv::Point(75, 70);
   const cv::Scalar ink = Rgb(20, 20, 20), white = Rgb(245, 245, 245), blue = Rgb(28, 84, 160);
   if (kind % 3 == 0) {
-    Polygon(image, {c + cv::Point(0, -64), c + cv::Point(70, 56), c + cv::Point(-70, 56)}, ink);
-    Polygon(image, {c + cv::Point(0, -46), c + cv::Point(55, 47), c + cv::Point(-55, 47)},
-            Rgb(244, 200, 30));
+    PrintPolygon(image, {c + cv::Point(0, -64), c + cv::Point(70, 56), c + cv::Point(-70, 56)},
+                 ink);
+    PrintPolygon(image, {c + cv::Point(0, -46), c + cv::Point(55, 47), c + cv::Point(-55, 47)},
+                 Rgb(244, 200, 30));
   } else {
     cv::circle(image, c, 64, kind % 3 == 1 ? blue : Rgb(190, 30, 34), cv::FILLED, cv::LINE_AA);
     if (kind % 3 == 2) cv::circle(image, c, 50, white, cv::FILLED, cv::LINE_AA);
@@ -30,10 +31,10 @@ void Pictogram(cv::Mat& image, const cv::Point& at, int kind) {
   const cv::Scalar mark = kind % 3 == 1 ? white : ink;
   switch (kind) {
     case 0:  // lightning
-      Polygon(image,
-              {c + cv::Point(6, -30), c + cv::Point(-14, 14), c + cv::Point(0, 12),
-               c + cv::Point(-8, 40), c + cv::Point(16, 2), c + cv::Point(2, 4)},
-              mark);
+      PrintPolygon(image,
+                   {c + cv::Point(6, -30), c + cv::Point(-14, 14), c + cv::Point(0, 12),
+                    c + cv::Point(-8, 40), c + cv::Point(16, 2), c + cv::Point(2, 4)},
+                   mark);
       break;
     case 1:  // goggles
       cv::circle(image, c + cv::Point(-22, 0), 18, mark, 7, cv::LINE_AA);
@@ -95,7 +96,7 @@ cv::Mat PaintLandscape(std::uint64_t seed) {
       ridge.emplace_back(view.x + x, std::min(668, static_cast<int>(base + h)));
     }
     ridge.emplace_back(view.x + view.width, 670);
-    Polygon(image, ridge, Shade(Rgb(44, 74, 98), 0.5 - 0.2 * range));
+    PrintPolygon(image, ridge, Shade(Rgb(44, 74, 98), 0.5 - 0.2 * range));
     if (range == 1) {
       for (std::size_t k = 2; k + 2 < ridge.size(); k += 2) {
         if (ridge[k].y < 330)
@@ -107,9 +108,9 @@ cv::Mat PaintLandscape(std::uint64_t seed) {
   for (int k = 0; k < 46; ++k) {  // firs
     const cv::Point foot(rng.uniform(44, 556), rng.uniform(590, 668));
     const int h = rng.uniform(30, 70);
-    Polygon(image,
-            {foot + cv::Point(0, -h), foot + cv::Point(h / 4, 0), foot + cv::Point(-h / 4, 0)},
-            Shade(Rgb(26, 52, 40), rng.uniform(-0.2, 0.2)));
+    PrintPolygon(image,
+                 {foot + cv::Point(0, -h), foot + cv::Point(h / 4, 0), foot + cv::Point(-h / 4, 0)},
+                 Shade(Rgb(26, 52, 40), rng.uniform(-0.2, 0.2)));
   }
   Fill(image, {0, 671, kWidth, 169}, Rgb(236, 228, 206));
   Text(image, "ALPINE TRAILS", {300, 722}, 44, Rgb(44, 62, 80), 3);
@@ -122,7 +123,7 @@ cv::Mat PaintSafety(std::uint64_t seed) {
   cv::Mat image = Sheet(Rgb(246, 244, 236));
   Fill(image, {0, 0, kWidth, 150}, Rgb(244, 198, 28));
   for (int x = -40; x < kWidth; x += 60) {
-    Polygon(image, {{x, 150}, {x + 30, 150}, {x + 54, 174}, {x + 24, 174}}, Rgb(24, 24, 24));
+    PrintPolygon(image, {{x, 150}, {x + 30, 150}, {x + 54, 174}, {x + 24, 174}}, Rgb(24, 24, 24));
   }
   Text(image, "WORK SAFE", {300, 58}, 52, Rgb(24, 24, 24), 4);
   Text(image, "in this workshop", {300, 116}, 26, Rgb(24, 24, 24), 2);
@@ -174,7 +175,7 @@ cv::Mat PaintCityMap(std::uint64_t seed) {
            kind == 0   ? Rgb(164, 196, 132)
            : kind == 1 ? Rgb(224, 170, 140)
                        : Shade(Rgb(206, 196, 178), rng.uniform(-0.12, 0.1)));
-      if (kind > 8) Frame(image, block, Rgb(150, 140, 124), 1);
+      if (kind > 8) DrawFrame(image, block, Rgb(150, 140, 124), 1);
     }
   }
   std::vector<cv::Point> river;
@@ -195,10 +196,10 @@ cv::Mat PaintCityMap(std::uint64_t seed) {
     Text(image, kPlaces[k], {110 + 240 * (k % 4), 120 + 400 * (k / 4) + rng.uniform(-50, 50)}, 20,
          Rgb(60, 50, 46), 2);
   Fill(image, {690, 590, 250, 110}, Rgb(246, 242, 232));
-  Frame(image, {690, 590, 250, 110}, Rgb(60, 50, 46), 2);
+  DrawFrame(image, {690, 590, 250, 110}, Rgb(60, 50, 46), 2);
   Text(image, "CITY MAP", {815, 622}, 28, Rgb(60, 50, 46), 2);
   Lines(image, rng, {710, 650, 210, 40}, 7, Rgb(120, 110, 100));
-  Frame(image, {4, 4, 952, 712}, Rgb(60, 50, 46), 6);
+  DrawFrame(image, {4, 4, 952, 712}, Rgb(60, 50, 46), 6);
   return image;
 }
 
@@ -223,9 +224,10 @@ cv::Mat PaintShapes(std::uint64_t seed) {
                       cv::LINE_AA);
           break;
         case 2:
-          Polygon(image,
-                  {{cell.x, cell.y + 158}, {cell.x + 176, cell.y + 158}, {cell.x + 88, cell.y + 8}},
-                  front);
+          PrintPolygon(
+              image,
+              {{cell.x, cell.y + 158}, {cell.x + 176, cell.y + 158}, {cell.x + 88, cell.y + 8}},
+              front);
           break;
         default:
           for (int k = 0; k < 5; ++k)
@@ -244,7 +246,7 @@ cv::Mat PaintBlueprint(std::uint64_t seed) {
   const cv::Scalar ink = Rgb(222, 232, 244), faint = Rgb(60, 98, 154);
   for (int k = 0; k < 900; k += 30) cv::line(image, {k, 0}, {k, 600}, faint, 1);
   for (int k = 0; k < 600; k += 30) cv::line(image, {0, k}, {900, k}, faint, 1);
-  Frame(image, {20, 20, 860, 560}, ink, 3);
+  DrawFrame(image, {20, 20, 860, 560}, ink, 3);
   cv::circle(image, {260, 270}, 150, ink, 3, cv::LINE_AA);
   cv::circle(image, {260, 270}, 96, ink, 2, cv::LINE_AA);
   cv::circle(image, {260, 270}, 34, ink, 3, cv::LINE_AA);
@@ -267,7 +269,7 @@ cv::Mat PaintBlueprint(std::uint64_t seed) {
   Text(image, "118.5", {645, 408}, 16, ink, 1);
   Text(image, "R 75", {400, 150}, 16, ink, 1);
   Fill(image, {560, 470, 320, 110}, Rgb(34, 76, 138));
-  Frame(image, {560, 470, 320, 110}, ink, 2);
+  DrawFrame(image, {560, 470, 320, 110}, ink, 2);
   Text(image, "DRIVE HUB  4-17", {720, 498}, 22, ink, 2);
   Lines(image, rng, {580, 525, 280, 46}, 7, ink);
   return image;
@@ -305,7 +307,7 @@ cv::Mat PaintSlogan(std::uint64_t seed) {
   for (int x = 40; x <= 560; x += 13) {  // a ruler
     cv::line(image, {x, 380}, {x, 380 + (x % 65 == 40 ? 60 : 30)}, ink, 3, cv::LINE_AA);
   }
-  Frame(image, {34, 372, 534, 90}, ink, 5);
+  DrawFrame(image, {34, 372, 534, 90}, ink, 5);
   Lines(image, rng, {180, 785, 240, 20}, 8, ink);
   return image;
 }

@@ -41,7 +41,7 @@ cv::Mat PaintFloor(std::uint64_t seed) {
       const cv::Scalar base = Shade(Rgb(168, 122, 80), rng.uniform(-0.20, 0.10));
       cv::Mat wood = Wood(rng, {length, height}, base);
       wood(cv::Rect(0, 0, plank.width, plank.height)).copyTo(image(plank));
-      Frame(image, plank, Rgb(88, 60, 38), 1);
+      DrawFrame(image, plank, Rgb(88, 60, 38), 1);
     }
   }
   return image;
@@ -70,9 +70,9 @@ cv::Mat PaintRug(std::uint64_t seed) {
   const cv::Scalar deep = rng.uniform(0, 2) ? Rgb(112, 34, 38) : Rgb(36, 58, 92);
   const cv::Scalar cream = Rgb(206, 188, 152), ochre = Rgb(178, 128, 62);
   cv::Mat image(size, CV_8UC3, deep);
-  Frame(image, {10, 10, 748, 492}, cream, 8);
-  Frame(image, {34, 34, 700, 444}, ochre, 5);
-  Frame(image, {78, 78, 612, 356}, cream, 4);
+  DrawFrame(image, {10, 10, 748, 492}, cream, 8);
+  DrawFrame(image, {34, 34, 700, 444}, ochre, 5);
+  DrawFrame(image, {78, 78, 612, 356}, cream, 4);
   for (int x = 56; x < 740; x += 34) {
     for (const int y : {56, 456}) {
       cv::ellipse(image, {x, y}, {9, 6}, 45, 0, 360, x % 68 < 34 ? cream : ochre, cv::FILLED,
@@ -161,14 +161,14 @@ cv::Mat PaintDoor(std::uint64_t seed) {
   cv::rotate(image, image, cv::ROTATE_90_CLOCKWISE);  // 448 x 1024, grain upright
   for (const cv::Rect& panel : {cv::Rect(60, 70, 140, 360), cv::Rect(248, 70, 140, 360),
                                 cv::Rect(60, 520, 140, 420), cv::Rect(248, 520, 140, 420)}) {
-    Frame(image, panel, Rgb(104, 84, 60), 4);
-    Frame(image, {panel.x + 14, panel.y + 14, panel.width - 28, panel.height - 28},
-          Rgb(206, 182, 148), 3);
-    Frame(image, {panel.x + 18, panel.y + 18, panel.width - 36, panel.height - 36},
-          Rgb(120, 98, 72), 2);
+    DrawFrame(image, panel, Rgb(104, 84, 60), 4);
+    DrawFrame(image, {panel.x + 14, panel.y + 14, panel.width - 28, panel.height - 28},
+              Rgb(206, 182, 148), 3);
+    DrawFrame(image, {panel.x + 18, panel.y + 18, panel.width - 36, panel.height - 36},
+              Rgb(120, 98, 72), 2);
   }
   Fill(image, {150, 462, 148, 34}, Rgb(232, 230, 222));
-  Frame(image, {150, 462, 148, 34}, Rgb(90, 90, 90), 1);
+  DrawFrame(image, {150, 462, 148, 34}, Rgb(90, 90, 90), 1);
   Text(image, "ROOM 3.07", {224, 479}, 14, Rgb(40, 40, 44));
   return image;
 }
@@ -198,7 +198,7 @@ cv::Mat PaintOutside(std::uint64_t seed) {
     for (int y = top + 16; y < 560; y += 46) {
       for (int u = x + 10; u + 18 < x + width; u += 30) {
         Fill(image, {u, y, 18, 26}, Rgb(70, 84, 104));
-        Frame(image, {u, y, 18, 26}, Rgb(228, 226, 220), 2);
+        DrawFrame(image, {u, y, 18, 26}, Rgb(228, 226, 220), 2);
       }
     }
     x += width;

@@ -36,14 +36,14 @@ cv::Mat Letter(cv::RNG& rng, const cv::Size& size, int kind) {
     Text(page, "INVOICE", {w - 130, 52}, 22, Rgb(40, 40, 44), 2);
     Lines(page, rng, {30, 100, w / 2, 60}, 7, Rgb(60, 60, 64));
     for (int k = 0; k < 7; ++k) {
-      Frame(page, {30, 200 + 34 * k, w - 60, 34}, Rgb(120, 120, 124));
+      DrawFrame(page, {30, 200 + 34 * k, w - 60, 34}, Rgb(120, 120, 124));
       Lines(page, rng, {40, 212 + 34 * k, w - 160, 14}, 7, Rgb(60, 60, 64));
     }
     Lines(page, rng, {30, 470, w - 60, 70}, 7, Rgb(60, 60, 64));
   } else if (kind == 1) {
     Text(page, "Test report 118", {w / 2, 50}, 22, Rgb(30, 30, 34), 2);
     Lines(page, rng, {30, 90, w - 60, 140}, 7, Rgb(60, 60, 64));
-    Frame(page, {40, 250, w - 80, 180}, Rgb(40, 40, 44), 2);
+    DrawFrame(page, {40, 250, w - 80, 180}, Rgb(40, 40, 44), 2);
     cv::Point last(42, 400);
     for (int x = 0; x < w - 84; x += 6) {
       const cv::Point next(42 + x,
@@ -64,7 +64,7 @@ cv::Mat Letter(cv::RNG& rng, const cv::Size& size, int kind) {
     for (int y = 20; y < h; y += 26)
       cv::circle(page, {16, y}, 5, Rgb(60, 60, 64), cv::FILLED, cv::LINE_AA);
   } else {
-    Frame(page, {16, 16, w - 32, h - 32}, Rgb(30, 30, 34), 2);
+    DrawFrame(page, {16, 16, w - 32, h - 32}, Rgb(30, 30, 34), 2);
     cv::circle(page, {w / 2, h / 2 - 40}, 120, Rgb(30, 30, 34), 2, cv::LINE_AA);
     cv::circle(page, {w / 2, h / 2 - 40}, 60, Rgb(30, 30, 34), 2, cv::LINE_AA);
     for (int k = 0; k < 6; ++k) {
@@ -74,7 +74,7 @@ cv::Mat Letter(cv::RNG& rng, const cv::Size& size, int kind) {
                  14, Rgb(30, 30, 34), 2, cv::LINE_AA);
     }
     Fill(page, {w - 200, h - 90, 180, 70}, Rgb(232, 232, 230));
-    Frame(page, {w - 200, h - 90, 180, 70}, Rgb(30, 30, 34), 2);
+    DrawFrame(page, {w - 200, h - 90, 180, 70}, Rgb(30, 30, 34), 2);
     Text(page, "FLANGE B", {w - 110, h - 55}, 18, Rgb(30, 30, 34), 2);
   }
   return page;
@@ -127,7 +127,7 @@ cv::Mat PaintCartons(std::uint64_t seed) {
     const cv::Rect label(o.x + 60, o.y + 70, 300, 200);
     DropShadow(atlas, label, 4, 0.3);
     Fill(atlas, label, Rgb(246, 246, 240));
-    Frame(atlas, label, Rgb(60, 60, 60), 2);
+    DrawFrame(atlas, label, Rgb(60, 60, 60), 2);
     Text(atlas, kNames[k], {label.x + 150, label.y + 40}, 30,
          k == 1 ? Rgb(200, 30, 30) : Rgb(30, 30, 34), 3);
     Lines(atlas, rng, {label.x + 16, label.y + 78, 160, 60}, 8, Rgb(50, 50, 54));
@@ -306,7 +306,7 @@ cv::Mat PaintDrawers(std::uint64_t seed) {
       const cv::Scalar plastic = Shade(rng.uniform(0, 5) ? Rgb(176, 188, 196) : Rgb(200, 130, 60),
                                        rng.uniform(-0.2, 0.15));
       Fill(image, drawer, plastic);
-      Frame(image, drawer, Shade(plastic, -0.5), 2);
+      DrawFrame(image, drawer, Shade(plastic, -0.5), 2);
       for (int k = 0; k < 16; ++k) {  // what shimmers through
         cv::circle(image, {drawer.x + rng.uniform(10, 106), drawer.y + rng.uniform(34, 62)},
                    rng.uniform(2, 5), Shade(plastic, rng.uniform(-0.55, -0.1)), cv::FILLED,
@@ -331,7 +331,7 @@ cv::Mat PaintPrinter(std::uint64_t seed) {
   Text(image, "READY", {410, 25}, 14, Rgb(20, 30, 34), 1);
   Fill(image, {50, 90, 412, 44}, Rgb(36, 36, 38));
   Fill(image, {80, 110, 340, 20}, Rgb(246, 246, 244));
-  Frame(image, {20, 160, 472, 80}, Rgb(120, 120, 118), 3);
+  DrawFrame(image, {20, 160, 472, 80}, Rgb(120, 120, 118), 3);
   Fill(image, {216, 176, 80, 14}, Rgb(120, 120, 118));
   Text(image, "LaserPrint 420", {110, 70}, 15, Rgb(60, 60, 64), 1);
   Grain(image, rng, 2.0, 1);

@@ -4,14 +4,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "shared/geometry/angle.hpp"
+
 namespace saccade {
 namespace {
 
 constexpr double kRestS = 1.2;  // facing the chessboard
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-std::uint64_t Mix(std::uint64_t x) {
+std::uint64_t MixWearer(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
   x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
@@ -52,7 +53,7 @@ Rigid3 Wearer::WorldFromShoulder(double time_s) const {
 }
 
 double Wearer::Random(std::uint64_t channel, std::uint64_t index) const {
-  const std::uint64_t bits = Mix(Mix(seed_ * 1000003ULL + channel) + index);
+  const std::uint64_t bits = MixWearer(MixWearer(seed_ * 1000003ULL + channel) + index);
   return static_cast<double>(bits >> 11) * 0x1.0p-52 - 1.0;
 }
 

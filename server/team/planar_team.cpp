@@ -40,7 +40,7 @@ void PlanarTeam::AddBlock(int robot, const Eigen::Vector3d& pose, double positio
       options_.sight_delay_s;
   const PlanarMatrix covariance = sigma.cwiseAbs2().asDiagonal();
   const absl::StatusOr<BlockId> block = filter_.Add(
-      absl::StrCat("robot ", robot), BlockKind::kRobot, {std::nullopt, state}, covariance);
+      absl::StrCat("robot ", robot), TeamBlockKind::kRobot, {std::nullopt, state}, covariance);
   Member& member = members_[robot];
   member.start.reset();
   if (!block.ok()) {  // a pose that is not finite

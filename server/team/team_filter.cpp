@@ -38,7 +38,7 @@ absl::Status TeamFilter::CheckNew(const std::string& name, const BlockState& sta
   return absl::OkStatus();
 }
 
-absl::StatusOr<BlockId> TeamFilter::Add(const std::string& name, BlockKind kind,
+absl::StatusOr<BlockId> TeamFilter::Add(const std::string& name, TeamBlockKind kind,
                                         const BlockState& state,
                                         const Eigen::MatrixXd& covariance) {
   if (absl::Status valid = CheckNew(name, state, covariance); !valid.ok()) return valid;
@@ -46,7 +46,7 @@ absl::StatusOr<BlockId> TeamFilter::Add(const std::string& name, BlockKind kind,
   return next_++;
 }
 
-absl::StatusOr<BlockId> TeamFilter::Derive(const std::string& name, BlockKind kind,
+absl::StatusOr<BlockId> TeamFilter::Derive(const std::string& name, TeamBlockKind kind,
                                            const BlockState& state,
                                            std::span<const BlockJacobian> from,
                                            const Eigen::MatrixXd& noise) {

@@ -18,7 +18,7 @@ namespace saccade {
 
 /// Never used twice.
 using BlockId = int;
-enum class BlockKind { kRobot, kCamera, kMarker, kMapFrame, kFeature };
+enum class TeamBlockKind { kRobot, kCamera, kMarker, kMapFrame, kFeature };
 
 /// What an observation depends on, at one linearisation point: rows x block dim each.
 struct BlockJacobian {
@@ -54,12 +54,13 @@ class TeamFilter {
  public:
   /// A block that nobody knows anything of yet. InvalidArgument: the name is taken or empty,
   /// numbers are not finite, `covariance` is not dim x dim, symmetric, with a positive diagonal.
-  absl::StatusOr<BlockId> Add(const std::string& name, BlockKind kind, const BlockState& state,
+  absl::StatusOr<BlockId> Add(const std::string& name, TeamBlockKind kind, const BlockState& state,
                               const Eigen::MatrixXd& covariance);
   /// A block that was computed from others: error = sum of jacobian * error of each + noise
   /// (slam-spec 1, augmentation). InvalidArgument as Add, or sizes that do not fit.
-  absl::StatusOr<BlockId> Derive(const std::string& name, BlockKind kind, const BlockState& state,
-                                 std::span<const BlockJacobian> from, const Eigen::MatrixXd& noise);
+  absl::StatusOr<BlockId> Derive(const std::string& name, TeamBlockKind kind,
+                                 const BlockState& state, std::span<const BlockJacobian> from,
+                                 const Eigen::MatrixXd& noise);
   /// NotFound: no such block.
   absl::Status Remove(BlockId id);
 
@@ -78,7 +79,7 @@ class TeamFilter {
   std::optional<BlockId> Find(const std::string& name) const;
   bool Has(BlockId id) const { return blocks_.contains(id); }
   const std::string& name(BlockId id) const { return blocks_.at(id).name; }
-  BlockKind kind(BlockId id) const { return blocks_.at(id).kind; }
+  TeamBlockKind kind(BlockId id) const { return blocks_.at(id).kind; }
   const BlockState& state(BlockId id) const { return blocks_.at(id).state; }
   const Eigen::MatrixXd& covariance(BlockId id) const { return blocks_.at(id).covariance; }
   /// Of `a`'s errors with `b`'s; zero where they share nothing.
@@ -91,7 +92,7 @@ class TeamFilter {
  private:
   struct Block {
     std::string name;
-    BlockKind kind;
+    TeamBlockKind kind;
     BlockState state;
     Eigen::MatrixXd covariance;
   };

@@ -15,13 +15,13 @@ constexpr double kHuber_px = 1.5;
 constexpr double kDamping = 1e-6;  // of the diagonal: scale is free, and must not run away
 constexpr double kLeastNoise_px = 0.2;
 
-struct Sight {
+struct PointSight {
   int view = 0;
   Eigen::Vector2d pixel;
 };
 struct Point {
   Eigen::Vector3d in_world;
-  std::vector<Sight> sights;
+  std::vector<PointSight> sights;
 };
 
 /// The first view stays; unknown: six of each other one, then the stretch, if it is sought.
@@ -46,7 +46,7 @@ class Adjustment {
       Eigen::Matrix3d v = Eigen::Matrix3d::Zero();
       Eigen::Vector3d b = Eigen::Vector3d::Zero();
       Eigen::MatrixXd w = Eigen::MatrixXd::Zero(unknown, 3);
-      for (const Sight& sight : point.sights) {
+      for (const PointSight& sight : point.sights) {
         const auto line = Linearise(point, sight);
         if (!line) continue;
         const Eigen::Matrix<double, 2, 3> to_point = -line->d_camera.leftCols<3>();
@@ -104,7 +104,7 @@ class Adjustment {
   double Rms_px(int* observations) const {
     double sum = 0.0, weights = 0.0;
     for (const Point& point : points_) {
-      for (const Sight& sight : point.sights) {
+      for (const PointSight& sight : point.sights) {
         const auto line = Linearise(point, sight);
         if (!line) continue;
         sum += line->weight * line->residual.squaredNorm();
@@ -126,7 +126,7 @@ class Adjustment {
     double weight = 1.0;
   };
 
-  std::optional<Line> Linearise(const Point& point, const Sight& sight) const {
+  std::optional<Line> Linearise(const Point& point, const PointSight& sight) const {
     const auto at = PredictFixed(camera_, views_[sight.view].world_from_camera, point.in_world);
     if (!at) return std::nullopt;
     const Eigen::Vector2d from_centre = at->pixel - centre_;

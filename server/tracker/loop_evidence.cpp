@@ -15,7 +15,7 @@ constexpr double kMostAside_rad = 0.7, kMostScale = 1.8;
 constexpr double kSpread_px = 25.0;    // at 640 pixels; as the relocaliser
 constexpr double kOffPlane = 0.015;    // of the distance, rms
 constexpr double kSamePoint_px = 2.5;  // an old and a present landmark on one corner
-constexpr double kDepthKnown = 0.1;
+constexpr double kLoopDepthKnown = 0.1;
 constexpr double kAgreeAngle_rad = 0.02, kAgreeShare = 0.03;  // between sights
 constexpr std::size_t kFewestScales = 6;
 // Log sigma of scale where nothing tells, and where points do: the seam must fit, whatever the way
@@ -87,7 +87,7 @@ double PresentRange(const Eigen::Vector2d& pixel, const FilterState& filter,
     if (!match.accepted() || (match.pixel - pixel).norm() > kSamePoint_px) continue;
     if (!filter.Has(match.id)) continue;
     const FeatureMarginal marginal = filter.Marginal(match.id);
-    if (marginal.inverse_range_sigma > kDepthKnown * marginal.inverse_range) continue;
+    if (marginal.inverse_range_sigma > kLoopDepthKnown * marginal.inverse_range) continue;
     return (marginal.point_in_world - filter.camera().world_from_camera.translation).norm();
   }
   return 0.0;

@@ -19,7 +19,7 @@ constexpr std::uint32_t kMatured = 8;        // matches before a feature is wort
 constexpr double kPositionShare = 0.3;  // of the distance to what is in view
 constexpr double kAngleSigma_rad = 0.26;
 constexpr double kVelocityShare_1_s = 0.5;
-constexpr double kAngularVelocitySigma_rad_s = 1.0;
+constexpr double kRecoveredSpinSigma_rad_s = 1.0;
 constexpr double kFoundSigma_px = 1.5;
 
 }  // namespace
@@ -85,7 +85,7 @@ bool Tracker::Accept(const Relocalisation& found, const CameraModel& camera) {
   sigma << Eigen::Vector3d::Constant(kPositionShare * unit),
       Eigen::Vector3d::Constant(kAngleSigma_rad),
       Eigen::Vector3d::Constant(kVelocityShare_1_s * unit),
-      Eigen::Vector3d::Constant(kAngularVelocitySigma_rad_s);
+      Eigen::Vector3d::Constant(kRecoveredSpinSigma_rad_s);
   CameraMotion motion;
   motion.world_from_camera = found.world_from_camera;
   filter_.ResetCamera(motion, sigma.cwiseAbs2().asDiagonal());

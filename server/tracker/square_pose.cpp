@@ -6,9 +6,9 @@
 namespace saccade {
 namespace {
 
-constexpr double kSigma_px = 0.3;
-constexpr double kWorst_px = 2.0;  // rms of the corners of a square that is where it is said
-constexpr double kSameAngle_rad = 0.05;
+constexpr double kPoseSigma_px = 0.3;
+constexpr double kWorstPose_px = 2.0;  // rms of the corners of a square that is where it is said
+constexpr double kSamePoseAngle_rad = 0.05;
 constexpr double kFloor_px = 0.05;  // below, residuals are noise of the detector
 
 double Rms(const CameraModel& camera, const Rigid3& world_from_camera,
@@ -62,7 +62,7 @@ std::optional<PoseFit> FitTo(const CameraModel& camera, const std::vector<Known>
                   known[k].sighting->corners.end());
   }
   PoseFitOptions options;
-  options.sigma_px = kSigma_px;
+  options.sigma_px = kPoseSigma_px;
   const auto fit = FitPose(camera, points, pixels, start, options);
   if (!fit.ok()) return std::nullopt;
   return *fit;
@@ -74,14 +74,14 @@ std::optional<SquarePose> PoseOfSquare(const CameraModel& camera, const MarkerSi
                                        double side_m) {
   const auto corners = SquareCorners(sighting.family, side_m);
   PoseFitOptions options;
-  options.sigma_px = kSigma_px;
+  options.sigma_px = kPoseSigma_px;
   const auto fits = FitPlanarPose(camera, corners, sighting.corners, options);
-  if (!fits.ok() || fits->empty() || fits->front().rms_px > kWorst_px) return std::nullopt;
+  if (!fits.ok() || fits->empty() || fits->front().rms_px > kWorstPose_px) return std::nullopt;
   const PoseFit& best = fits->front();
   SquarePose pose{best.world_from_camera, best.world_from_camera, 1e3, best.rms_px,
                   best.covariance};
   if (fits->size() > 1 &&
-      RotationAngle(best.world_from_camera, (*fits)[1].world_from_camera) > kSameAngle_rad) {
+      RotationAngle(best.world_from_camera, (*fits)[1].world_from_camera) > kSamePoseAngle_rad) {
     pose.other = (*fits)[1].world_from_camera;
     pose.ratio = std::max((*fits)[1].rms_px, kFloor_px) / std::max(best.rms_px, kFloor_px);
   }
@@ -107,12 +107,12 @@ std::optional<SquaresPose> PoseOfSquares(const CameraModel& camera,
       // One square's corners fix the camera loosely: far squares may be off by degrees at first.
       Rigid3 at = candidate;
       std::vector<std::size_t> agreeing;
-      for (const double worst_px : {12.0, 4.0, kWorst_px}) {
+      for (const double worst_px : {12.0, 4.0, kWorstPose_px}) {
         agreeing = Agreeing(camera, at, known, worst_px);
         const auto fit = FitTo(camera, known, agreeing, at);
         if (fit) at = fit->world_from_camera;
       }
-      agreeing = Agreeing(camera, at, known, kWorst_px);
+      agreeing = Agreeing(camera, at, known, kWorstPose_px);
       if (agreeing.empty()) continue;
       double sum = 0.0;
       for (const std::size_t k : agreeing) {
@@ -128,7 +128,7 @@ std::optional<SquaresPose> PoseOfSquares(const CameraModel& camera,
   }
   if (most.empty() || (most.size() == 1 && known.size() > 1)) return std::nullopt;
   const auto fit = FitTo(camera, known, most, start);
-  if (!fit || fit->rms_px > kWorst_px) return std::nullopt;
+  if (!fit || fit->rms_px > kWorstPose_px) return std::nullopt;
   return SquaresPose{*fit, static_cast<int>(most.size())};
 }
 

@@ -15,7 +15,7 @@ constexpr std::int64_t kMetreWait = 90;  // frames that a map waits for its unit
 constexpr std::int64_t kYoung = 300;  // frames: a map without the squares' world is given up for it
 // Of a camera that a detector has found a picture ago, beyond what its corners say.
 constexpr double kPositionSigma_m = 0.03, kAngleSigma_rad = 0.03;
-constexpr double kVelocitySigma_m_s = 0.5, kAngularVelocitySigma_rad_s = 1.0;
+constexpr double kVelocitySigma_m_s = 0.5, kSquaresSpinSigma_rad_s = 1.0;
 
 Matrix12d FoundCovariance(const Matrix6d& pose) {
   Matrix12d covariance = Matrix12d::Zero();
@@ -23,7 +23,7 @@ Matrix12d FoundCovariance(const Matrix6d& pose) {
   Vector12d sigma;
   sigma << Eigen::Vector3d::Constant(kPositionSigma_m), Eigen::Vector3d::Constant(kAngleSigma_rad),
       Eigen::Vector3d::Constant(kVelocitySigma_m_s),
-      Eigen::Vector3d::Constant(kAngularVelocitySigma_rad_s);
+      Eigen::Vector3d::Constant(kSquaresSpinSigma_rad_s);
   covariance.diagonal() += sigma.cwiseAbs2();
   return covariance;
 }

@@ -10,7 +10,7 @@ namespace {
 
 // A hand that has just picked the camera up.
 constexpr double kVelocitySigma_m_s = 0.3;
-constexpr double kAngularVelocitySigma_rad_s = 0.5;
+constexpr double kStartedSpinSigma_rad_s = 0.5;
 
 Matrix12d MotionCovariance(const Matrix6d& pose, double velocity, double angular_velocity) {
   Matrix12d covariance = Matrix12d::Zero();
@@ -81,8 +81,8 @@ std::optional<Start> Starter::TryChessboard(FrontEnd& front_end, FilterState& fi
   if (!seen.ok() || seen->ambiguous) return std::nullopt;
   CameraMotion camera;
   camera.world_from_camera = seen->world_from_camera;
-  filter.Reset(camera, MotionCovariance(seen->pose_covariance, kVelocitySigma_m_s,
-                                        kAngularVelocitySigma_rad_s));
+  filter.Reset(
+      camera, MotionCovariance(seen->pose_covariance, kVelocitySigma_m_s, kStartedSpinSigma_rad_s));
   for (std::size_t k = 0; k < seen->pixels.size(); ++k) {
     const auto patch = front_end.Cut(seen->pixels[k]);
     if (patch) AddKnown(*patch, seen->points_in_world[k], seen->world_from_camera, map);
@@ -114,7 +114,7 @@ std::optional<Start> Starter::TryPatches(FrontEnd& front_end, FilterState& filte
 std::optional<Start> Starter::Free(FilterState& filter) const {
   const double unit = options_.initial_depth_m;
   filter.Reset(CameraMotion(), MotionCovariance(Matrix6d::Zero(), kVelocitySigma_m_s * unit,
-                                                kAngularVelocitySigma_rad_s));
+                                                kStartedSpinSigma_rad_s));
   return Start{false, {1.0 / unit, 0.5 / unit}};
 }
 

@@ -25,7 +25,7 @@ constexpr milliseconds kMove(200);    // how soon a thread at a silent device se
 constexpr int kLateInARow = 10;       // a busy machine misses some
 constexpr milliseconds kStuck(300);   // a device that holds its thread longer keeps it
 constexpr milliseconds kAgain(1000);  // between attempts to open
-constexpr std::size_t kMostWaiting = 25;  // proto: SpeakRequest.packets
+constexpr std::size_t kMostWaitingSamples = 25;  // proto: SpeakRequest.packets
 constexpr Timestamp kHangover_ns = 500'000'000;
 
 void PauseFor(milliseconds duration, const std::stop_token& stop) {
@@ -78,7 +78,7 @@ class VoiceDevices::Shared {
       if (packet.opus.empty()) continue;
       const std::lock_guard lock(mutex_);
       waiting_.push_back(std::move(packet));
-      if (waiting_.size() > kMostWaiting) waiting_.pop_front();  // too old to be heard
+      if (waiting_.size() > kMostWaitingSamples) waiting_.pop_front();  // too old to be heard
       some_.notify_one();
     }
   }

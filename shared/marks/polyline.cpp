@@ -8,9 +8,9 @@
 namespace saccade {
 namespace {
 
-constexpr double kNearM = 0.02;
+constexpr double kNearest_m = 0.02;
 constexpr double kMaxBendPx = 0.25;
-constexpr double kBorderPx = 32.0;
+constexpr double kLineBorder_px = 32.0;
 constexpr int kMaxDepth = 8;
 
 using MaybePixel = std::optional<Eigen::Vector2d>;
@@ -23,7 +23,7 @@ class Projector {
     const MaybePixel pixel = camera_.Project(point_in_camera);
     return pixel && pixel->allFinite() ? pixel : std::nullopt;
   }
-  bool Near(const Eigen::Vector2d& pixel) const { return camera_.InImage(pixel, -kBorderPx); }
+  bool Near(const Eigen::Vector2d& pixel) const { return camera_.InImage(pixel, -kLineBorder_px); }
 
   /// Pixels along a segment, close enough together that straight lines between them will do.
   std::vector<MaybePixel> Sample(const Eigen::Vector3d& a, const Eigen::Vector3d& b) const {
@@ -79,13 +79,14 @@ struct Piece {
 };
 
 std::optional<Piece> CutAtNear(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  if (!a.allFinite() || !b.allFinite() || (a.z() < kNearM && b.z() < kNearM)) return std::nullopt;
+  if (!a.allFinite() || !b.allFinite() || (a.z() < kNearest_m && b.z() < kNearest_m))
+    return std::nullopt;
   Piece piece{a, b};
-  if (a.z() >= kNearM && b.z() >= kNearM) return piece;
-  const Eigen::Vector3d cut = a + (kNearM - a.z()) / (b.z() - a.z()) * (b - a);
+  if (a.z() >= kNearest_m && b.z() >= kNearest_m) return piece;
+  const Eigen::Vector3d cut = a + (kNearest_m - a.z()) / (b.z() - a.z()) * (b - a);
   if (!cut.allFinite()) return std::nullopt;
-  (a.z() < kNearM ? piece.a : piece.b) = cut;
-  (a.z() < kNearM ? piece.a_cut : piece.b_cut) = true;
+  (a.z() < kNearest_m ? piece.a : piece.b) = cut;
+  (a.z() < kNearest_m ? piece.a_cut : piece.b_cut) = true;
   return piece;
 }
 

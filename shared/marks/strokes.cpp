@@ -10,8 +10,8 @@ namespace saccade {
 namespace {
 
 constexpr double kAxisM = 0.1;
-constexpr double kBorderPx = 32.0;     // labels are kept this far outside the picture
-constexpr double kEdgeInsetPx = 26.0;  // of the tips of edge arrows
+constexpr double kStrokeBorder_px = 32.0;  // labels are kept this far outside the picture
+constexpr double kEdgeInsetPx = 26.0;      // of the tips of edge arrows
 constexpr std::size_t kMaxEdgeArrows = 8;
 
 std::string WithWarning(const std::string& words, bool hollow) {
@@ -70,7 +70,7 @@ Marks AnnotationMarks(const CameraModel& camera, const Rigid3& world_from_camera
     }
     const std::optional<Eigen::Vector2d> at =
         camera.Project(camera_from_world * LabelPoint(annotation, world_from_camera));
-    if (!at || !camera.InImage(*at, -kBorderPx)) continue;
+    if (!at || !camera.InImage(*at, -kStrokeBorder_px)) continue;
     const std::string words = LabelWords(annotation, metric);
     const std::string text = WithWarning(words, hollow);
     if (!text.empty()) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMostDepth = 64;
 
-absl::Status Bad(absl::string_view why) {
+absl::Status BadModel(absl::string_view why) {
   return absl::InvalidArgumentError(absl::StrCat("model: ", why));
 }
 
@@ -25,7 +25,7 @@ class Reader {
   static absl::StatusOr<Reader> Make(const tinygltf::Model& model, int index, const char* what,
                                      int components) {
     const auto missing = [&](const char* part) {
-      return Bad(absl::StrCat(what, ": its ", part, " is missing; export it again"));
+      return BadModel(absl::StrCat(what, ": its ", part, " is missing; export it again"));
     };
     if (index < 0 || index >= static_cast<int>(model.accessors.size())) return missing("accessor");
     const tinygltf::Accessor& accessor = model.accessors[static_cast<std::size_t>(index)];
@@ -42,7 +42,7 @@ class Reader {
         tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor.componentType));
     const int count = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type));
     if (size <= 0 || count != components) {
-      return Bad(absl::StrCat(what, ": of the wrong type; export it again"));
+      return BadModel(absl::StrCat(what, ": of the wrong type; export it again"));
     }
     Reader reader;
     reader.type_ = accessor.componentType;
@@ -59,8 +59,8 @@ class Reader {
          (element <= view.byteLength - accessor.byteOffset &&
           reader.count_ - 1 <= (view.byteLength - accessor.byteOffset - element) / reader.stride_));
     if (!inside) {
-      return Bad(absl::StrCat(what, ": ", reader.count_, " elements run beyond the buffer of ",
-                              std::min(end_of_view, data.size()), " bytes; the file is torn"));
+      return BadModel(absl::StrCat(what, ": ", reader.count_, " elements run beyond the buffer of ",
+                                   std::min(end_of_view, data.size()), " bytes; the file is torn"));
     }
     reader.first_ = data.data() + view.byteOffset + accessor.byteOffset;
     return reader;
@@ -135,7 +135,7 @@ class Collector {
     for (const int node : Roots()) {
       if (absl::Status done = Visit(node, root, 0); !done.ok()) return done;
     }
-    if (mesh_.empty()) return Bad("has no triangles");
+    if (mesh_.empty()) return BadModel("has no triangles");
     return std::move(mesh_);
   }
 
@@ -161,15 +161,15 @@ class Collector {
 
   absl::Status Visit(int index, const Eigen::Affine3d& root_from_parent, int depth) {
     if (index < 0 || index >= static_cast<int>(model_.nodes.size())) {
-      return Bad(absl::StrCat("node ", index, " is missing; export it again"));
+      return BadModel(absl::StrCat("node ", index, " is missing; export it again"));
     }
     if (depth > kMostDepth || ++visited_ > limits_.nodes) {
-      return Bad("its nodes run in a circle or too deep; export it again");
+      return BadModel("its nodes run in a circle or too deep; export it again");
     }
     const tinygltf::Node& node = model_.nodes[static_cast<std::size_t>(index)];
     const Eigen::Affine3d root_from_node = root_from_parent * LocalTransform(node);
     if (node.mesh >= static_cast<int>(model_.meshes.size())) {
-      return Bad(absl::StrCat("mesh ", node.mesh, " is missing; export it again"));
+      return BadModel(absl::StrCat("mesh ", node.mesh, " is missing; export it again"));
     }
     if (node.mesh >= 0) {
       for (const auto& part : model_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
@@ -189,12 +189,13 @@ class Collector {
     const absl::StatusOr<Reader> points = Reader::Make(
         model_, position == part.attributes.end() ? -1 : position->second, "positions", 3);
     if (!points.ok()) return points.status();
-    if (!points->IsFloat()) return Bad("positions are not float; export it without quantisation");
+    if (!points->IsFloat())
+      return BadModel("positions are not float; export it without quantisation");
     std::vector<std::uint32_t> corners;
     if (part.indices >= 0) {
       const absl::StatusOr<Reader> indices = Reader::Make(model_, part.indices, "indices", 1);
       if (!indices.ok()) return indices.status();
-      if (!indices->IsIndex()) return Bad("indices are no whole numbers; export it again");
+      if (!indices->IsIndex()) return BadModel("indices are no whole numbers; export it again");
       if (absl::Status room = Room(points->count(), indices->count(), mode); !room.ok()) {
         return room;
       }
@@ -209,19 +210,19 @@ class Collector {
     }
     for (const std::uint32_t corner : corners) {
       if (corner >= points->count()) {
-        return Bad(absl::StrCat("a triangle names vertex ", corner, " of ", points->count(),
-                                "; the file is damaged"));
+        return BadModel(absl::StrCat("a triangle names vertex ", corner, " of ", points->count(),
+                                     "; the file is damaged"));
       }
     }
     const auto base = static_cast<std::uint32_t>(mesh_.positions.size());
     for (std::size_t i = 0; i < points->count(); ++i) {
       const Eigen::Vector3d p = root_from_node * points->Point(i);
       if (!p.allFinite()) {
-        return Bad(absl::StrCat("vertex ", i, " is not a finite number; export it again"));
+        return BadModel(absl::StrCat("vertex ", i, " is not a finite number; export it again"));
       }
       if (p.cwiseAbs().maxCoeff() > limits_.extent_m) {
-        return Bad(absl::StrCat("vertex ", i, " is farther than ", limits_.extent_m,
-                                " m from the origin; export it in metres"));
+        return BadModel(absl::StrCat("vertex ", i, " is farther than ", limits_.extent_m,
+                                     " m from the origin; export it in metres"));
       }
       mesh_.positions.emplace_back(p.cast<float>());
     }
@@ -277,11 +278,11 @@ absl::StatusOr<TriangleMesh> ReadGlb(absl::string_view bytes, const GltfLimits& 
         static_cast<unsigned int>(checked->size()));
     if (!read) {
       std::replace(error.begin(), error.end(), '\n', ' ');
-      return Bad(absl::StrCat("cannot be read: ", error.substr(0, 200)));
+      return BadModel(absl::StrCat("cannot be read: ", error.substr(0, 200)));
     }
     return Collector(model, limits).Collect();
   } catch (const std::exception& problem) {
-    return Bad(absl::StrCat("cannot be read: ", problem.what()));
+    return BadModel(absl::StrCat("cannot be read: ", problem.what()));
   }
 }
 

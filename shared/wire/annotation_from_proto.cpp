@@ -5,20 +5,17 @@
 #include <utility>
 
 #include "shared/wire/annotation_shape.hpp"
+#include "shared/wire/bad_field.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade::wire {
 namespace {
 
-absl::Status Bad(absl::string_view field, absl::string_view problem) {
-  return absl::InvalidArgumentError(absl::StrCat(field, ": ", problem));
-}
-
 absl::StatusOr<AnnotationShape> ShapeFromProto(v1::AnnotationShape shape, absl::string_view field) {
   if (const std::optional<AnnotationShape> known = KnownShape(shape)) return *known;
-  return Bad(field, absl::StrCat("unknown shape ", static_cast<int>(shape),
-                                 ": use CUBE, NOTE, ARROW, INK, BOX, MEASURE, PIN, PICTURE or "
-                                 "CHECK_LIST"));
+  return BadField(field, absl::StrCat("unknown shape ", static_cast<int>(shape),
+                                      ": use CUBE, NOTE, ARROW, INK, BOX, MEASURE, PIN, PICTURE or "
+                                      "CHECK_LIST"));
 }
 
 /// What a shape does not have must not be given: it would be lost without a word.
@@ -44,7 +41,7 @@ absl::Status CheckBelongs(const v1::AnnotationDraft& draft, absl::string_view fi
       {!draft.picture().empty(), picture, ".picture", "only a PICTURE has one"},
       {!draft.check_items().empty(), list, ".check_items", "only a CHECK_LIST has lines"}};
   for (const auto& rule : kRules) {
-    if (rule.given && !rule.fits) return Bad(absl::StrCat(field, rule.name), rule.whose);
+    if (rule.given && !rule.fits) return BadField(absl::StrCat(field, rule.name), rule.whose);
   }
   return absl::OkStatus();
 }
@@ -54,15 +51,15 @@ absl::Status ReadInk(const v1::AnnotationDraft& message, const ImageSize& image,
   const bool offsets = message.ink_px().empty() && !message.ink_offset_m().empty();
   const std::string ink = absl::StrCat(field, offsets ? ".ink_offset_m" : ".ink_px");
   if (!message.ink_px().empty() && !message.ink_offset_m().empty()) {
-    return Bad(absl::StrCat(field, ".ink_offset_m"), "give this or ink_px, not both");
+    return BadField(absl::StrCat(field, ".ink_offset_m"), "give this or ink_px, not both");
   }
   const int points = offsets ? message.ink_offset_m_size() : message.ink_px_size();
-  if (points < 2) return Bad(ink, "a stroke has at least 2 points");
+  if (points < 2) return BadField(ink, "a stroke has at least 2 points");
   if (static_cast<std::size_t>(points) > kMaxInkPoints) {
-    return Bad(ink, absl::StrCat("at most ", kMaxInkPoints, " points, not ", points));
+    return BadField(ink, absl::StrCat("at most ", kMaxInkPoints, " points, not ", points));
   }
   if (!offsets && !message.target().has_frame_pixel()) {
-    return Bad(absl::StrCat(field, ".target"), "an INK shape with ink_px needs a frame_pixel");
+    return BadField(absl::StrCat(field, ".target"), "an INK shape with ink_px needs a frame_pixel");
   }
   for (int i = 0; i < message.ink_px_size(); ++i) {
     absl::StatusOr<Eigen::Vector2d> pixel =
@@ -90,11 +87,11 @@ absl::Status ReadMeasure(const v1::AnnotationDraft& message, const ImageSize& im
                          absl::string_view field, AnnotationDraft& draft) {
   if (!message.has_end_target()) {
     if (message.ink_offset_m_size() == 1) return absl::OkStatus();
-    return Bad(absl::StrCat(field, ".end_target"),
-               "is missing: a MEASURE needs it, or one point of ink_offset_m");
+    return BadField(absl::StrCat(field, ".end_target"),
+                    "is missing: a MEASURE needs it, or one point of ink_offset_m");
   }
   if (!message.ink_offset_m().empty()) {
-    return Bad(absl::StrCat(field, ".ink_offset_m"), "give this or end_target, not both");
+    return BadField(absl::StrCat(field, ".ink_offset_m"), "give this or end_target, not both");
   }
   absl::StatusOr<AnnotationTarget> end =
       FromProto(message.end_target(), image, absl::StrCat(field, ".end_target"));
@@ -106,17 +103,17 @@ absl::Status ReadMeasure(const v1::AnnotationDraft& message, const ImageSize& im
 absl::Status ReadItems(const v1::AnnotationDraft& message, absl::string_view field,
                        AnnotationDraft& draft) {
   const std::string items = absl::StrCat(field, ".check_items");
-  if (message.check_items().empty()) return Bad(items, "a CHECK_LIST has at least 1 line");
+  if (message.check_items().empty()) return BadField(items, "a CHECK_LIST has at least 1 line");
   if (static_cast<std::size_t>(message.check_items_size()) > kMaxCheckItems) {
-    return Bad(items, absl::StrCat("at most ", kMaxCheckItems, " lines, not ",
-                                   message.check_items_size()));
+    return BadField(items, absl::StrCat("at most ", kMaxCheckItems, " lines, not ",
+                                        message.check_items_size()));
   }
   for (int i = 0; i < message.check_items_size(); ++i) {
     const std::string one = absl::StrCat(items, "[", i, "]");
     const std::string& text = message.check_items(i);
-    if (text.empty()) return Bad(one, "is empty");
+    if (text.empty()) return BadField(one, "is empty");
     if (absl::Status good = CheckText(text, kMaxCheckItemBytes, one); !good.ok()) return good;
-    if (text.find('\n') != text.npos) return Bad(one, "holds a line feed: give two lines");
+    if (text.find('\n') != text.npos) return BadField(one, "holds a line feed: give two lines");
     draft.check_items.push_back(text);
   }
   return absl::OkStatus();
@@ -124,10 +121,11 @@ absl::Status ReadItems(const v1::AnnotationDraft& message, absl::string_view fie
 
 absl::Status CheckPicture(const v1::AnnotationDraft& message, absl::string_view field) {
   const std::string picture = absl::StrCat(field, ".picture");
-  if (message.picture().empty()) return Bad(picture, "is missing: give the bytes of a PNG or JPEG");
+  if (message.picture().empty())
+    return BadField(picture, "is missing: give the bytes of a PNG or JPEG");
   if (message.picture().size() <= kMaxPictureBytes) return absl::OkStatus();
-  return Bad(picture, absl::StrCat("at most ", kMaxPictureBytes, " bytes, not ",
-                                   message.picture().size(), ": make it smaller"));
+  return BadField(picture, absl::StrCat("at most ", kMaxPictureBytes, " bytes, not ",
+                                        message.picture().size(), ": make it smaller"));
 }
 
 absl::Status ReadShape(const v1::AnnotationDraft& message, const ImageSize& image,
@@ -155,8 +153,8 @@ absl::StatusOr<Eigen::Vector3d> CheckExtent(const v1::Vector3& message, absl::st
   for (int i = 0; i < 3; ++i) {
     const double edge = (*extent)[i];
     if (edge < kMinSizeM || edge > kMaxSizeM) {
-      return Bad(absl::StrCat(field, part[i]),
-                 absl::StrCat(edge, " is not between ", kMinSizeM, " and ", kMaxSizeM));
+      return BadField(absl::StrCat(field, part[i]),
+                      absl::StrCat(edge, " is not between ", kMinSizeM, " and ", kMaxSizeM));
     }
   }
   return extent;
@@ -165,7 +163,8 @@ absl::StatusOr<Eigen::Vector3d> CheckExtent(const v1::Vector3& message, absl::st
 absl::Status CheckEditGroup(absl::string_view group) {
   absl::Status text = CheckText(group, kMaxEditGroupBytes, "edit_group");
   if (!text.ok()) return text;
-  return group.find('\n') == group.npos ? absl::OkStatus() : Bad("edit_group", "holds a line feed");
+  return group.find('\n') == group.npos ? absl::OkStatus()
+                                        : BadField("edit_group", "holds a line feed");
 }
 
 absl::StatusOr<AnnotationDraft> FromProto(const v1::AnnotationDraft& message,

@@ -5,22 +5,20 @@
 
 #include <cmath>
 
+#include "shared/wire/bad_field.hpp"
+
 namespace saccade::wire {
 namespace {
 
-absl::Status Bad(absl::string_view field, absl::string_view problem) {
-  return absl::InvalidArgumentError(absl::StrCat(field, ": ", problem));
-}
-
 absl::Status CheckFinite(double value, absl::string_view field, absl::string_view part) {
   if (std::isfinite(value)) return absl::OkStatus();
-  return Bad(absl::StrCat(field, ".", part), "must be a finite number");
+  return BadField(absl::StrCat(field, ".", part), "must be a finite number");
 }
 
 absl::StatusOr<AnnotationTarget> PixelTargetFromProto(const v1::FramePixel& message,
                                                       const ImageSize& image,
                                                       absl::string_view field) {
-  if (!message.has_pixel()) return Bad(absl::StrCat(field, ".pixel"), "is missing");
+  if (!message.has_pixel()) return BadField(absl::StrCat(field, ".pixel"), "is missing");
   absl::StatusOr<Eigen::Vector2d> pixel =
       FromProto(message.pixel(), image, absl::StrCat(field, ".pixel"));
   if (!pixel.ok()) return pixel.status();
@@ -35,7 +33,7 @@ absl::StatusOr<AnnotationTarget> RayFromProto(const v1::Ray& message, absl::stri
   absl::StatusOr<Eigen::Vector3d> direction =
       FromProto(message.direction_in_world(), direction_field);
   if (!direction.ok()) return direction.status();
-  if (direction->norm() < 1e-9) return Bad(direction_field, "must be longer than 0");
+  if (direction->norm() < 1e-9) return BadField(direction_field, "must be longer than 0");
   return RayTarget{*origin, *direction};
 }
 
@@ -50,8 +48,9 @@ absl::StatusOr<Eigen::Vector2d> FromProto(const v1::Pixel& message, const ImageS
     if (absl::Status s = CheckFinite(pixel[i], field, part[i]); !s.ok()) return s;
     // Half a pixel beyond the centres of the outermost pixels is still the picture.
     if (pixel[i] < -0.5 || pixel[i] > size[i] - 0.5) {
-      return Bad(absl::StrCat(field, ".", part[i]),
-                 absl::StrCat(pixel[i], " is outside the picture (-0.5 to ", size[i] - 0.5, ")"));
+      return BadField(
+          absl::StrCat(field, ".", part[i]),
+          absl::StrCat(pixel[i], " is outside the picture (-0.5 to ", size[i] - 0.5, ")"));
     }
   }
   return pixel;
@@ -63,8 +62,8 @@ absl::StatusOr<Eigen::Vector3d> FromProto(const v1::Vector3& message, absl::stri
   for (int i = 0; i < 3; ++i) {
     if (absl::Status s = CheckFinite(value[i], field, part[i]); !s.ok()) return s;
     if (std::abs(value[i]) > kMaxCoordinateM) {
-      return Bad(absl::StrCat(field, ".", part[i]),
-                 absl::StrCat(value[i], " is beyond ", kMaxCoordinateM));
+      return BadField(absl::StrCat(field, ".", part[i]),
+                      absl::StrCat(value[i], " is beyond ", kMaxCoordinateM));
     }
   }
   return value;
@@ -89,21 +88,21 @@ absl::StatusOr<AnnotationTarget> FromProto(const v1::AnnotationTarget& message,
     case v1::AnnotationTarget::TARGET_NOT_SET:
       break;
   }
-  return Bad(field, "is missing: give frame_pixel, feature_id, point_in_world_m or ray");
+  return BadField(field, "is missing: give frame_pixel, feature_id, point_in_world_m or ray");
 }
 
 absl::StatusOr<double> CheckSize(double size_m, absl::string_view field) {
-  if (!std::isfinite(size_m)) return Bad(field, "must be a finite number");
+  if (!std::isfinite(size_m)) return BadField(field, "must be a finite number");
   if (size_m == 0.0) return kDefaultSizeM;
   if (size_m < kMinSizeM || size_m > kMaxSizeM) {
-    return Bad(field, absl::StrCat(size_m, " is not between ", kMinSizeM, " and ", kMaxSizeM));
+    return BadField(field, absl::StrCat(size_m, " is not between ", kMinSizeM, " and ", kMaxSizeM));
   }
   return size_m;
 }
 
 absl::Status CheckText(absl::string_view text, std::size_t max_bytes, absl::string_view field) {
   if (text.size() > max_bytes) {
-    return Bad(field, absl::StrCat("at most ", max_bytes, " bytes, not ", text.size()));
+    return BadField(field, absl::StrCat("at most ", max_bytes, " bytes, not ", text.size()));
   }
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(text[at]); };
@@ -111,7 +110,7 @@ absl::Status CheckText(absl::string_view text, std::size_t max_bytes, absl::stri
     const bool second_set =
         byte(i) == 0xc2 && i + 1 < text.size() && byte(i + 1) >= 0x80 && byte(i + 1) < 0xa0;
     if (second_set || (absl::ascii_iscntrl(byte(i)) && text[i] != '\n')) {
-      return Bad(field, "holds a control character");
+      return BadField(field, "holds a control character");
     }
   }
   return absl::OkStatus();
@@ -124,7 +123,7 @@ absl::Status CheckUuid(absl::string_view id, absl::string_view field) {
     good = dash ? id[i] == '-' : absl::ascii_isxdigit(static_cast<unsigned char>(id[i]));
   }
   return good ? absl::OkStatus()
-              : Bad(field, "must be a UUID such as 6f1c2c9e-3d43-4d0a-9f5e-0c9b1a7f2d11");
+              : BadField(field, "must be a UUID such as 6f1c2c9e-3d43-4d0a-9f5e-0c9b1a7f2d11");
 }
 
 }  // namespace saccade::wire

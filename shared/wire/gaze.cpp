@@ -4,15 +4,12 @@
 
 #include <cmath>
 
+#include "shared/wire/bad_field.hpp"
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade::wire {
 namespace {
-
-absl::Status Bad(absl::string_view field, absl::string_view problem) {
-  return absl::InvalidArgumentError(absl::StrCat(field, ": ", problem));
-}
 
 GazePilot PilotFromProto(const v1::GazePilot& message) {
   return {message.participant_id(), message.display_name()};
@@ -31,7 +28,7 @@ absl::Status NumbersFromProto(const v1::GazeState& message, absl::string_view fi
   if (message.has_pan_rad() || message.has_elevation_rad() || message.has_cyclotorsion_rad()) {
     state.joints_rad = {message.pan_rad(), message.elevation_rad(), message.cyclotorsion_rad()};
     if (!state.joints_rad->allFinite()) {
-      return Bad(absl::StrCat(field, ".pan_rad"), "joint angles must be finite numbers");
+      return BadField(absl::StrCat(field, ".pan_rad"), "joint angles must be finite numbers");
     }
   }
   if (message.has_error_rad()) state.error_rad = message.error_rad();
@@ -39,7 +36,7 @@ absl::Status NumbersFromProto(const v1::GazeState& message, absl::string_view fi
   state.miss_rad = message.miss_rad();
   if (!std::isfinite(state.error_rad.value_or(0)) ||
       !std::isfinite(state.guidance_rad.value_or(0)) || !std::isfinite(state.miss_rad)) {
-    return Bad(absl::StrCat(field, ".error_rad"), "angles must be finite numbers");
+    return BadField(absl::StrCat(field, ".error_rad"), "angles must be finite numbers");
   }
   return absl::OkStatus();
 }
@@ -110,14 +107,14 @@ absl::StatusOr<GazeTarget> FromProto(const v1::GazeTarget& message, absl::string
     case v1::GazeTarget::TARGET_NOT_SET:
       break;
   }
-  return Bad(field, "is missing: give annotation_id, feature_id or point_in_world_m");
+  return BadField(field, "is missing: give annotation_id, feature_id or point_in_world_m");
 }
 
 absl::StatusOr<GazeSnapshot> FromProto(const v1::GazeState& message, absl::string_view field) {
   GazeSnapshot state;
   if (!v1::GazeMode_IsValid(message.mode()) || message.mode() == v1::GAZE_MODE_UNSPECIFIED) {
-    return Bad(absl::StrCat(field, ".mode"),
-               absl::StrCat("unknown mode ", static_cast<int>(message.mode())));
+    return BadField(absl::StrCat(field, ".mode"),
+                    absl::StrCat("unknown mode ", static_cast<int>(message.mode())));
   }
   state.mode = static_cast<GazeMode>(message.mode() - v1::GAZE_MODE_NO_MOUNT);
   if (absl::Status numbers = NumbersFromProto(message, field, state); !numbers.ok()) return numbers;

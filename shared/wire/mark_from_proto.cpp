@@ -8,14 +8,11 @@
 #include <vector>
 
 #include "shared/wire/annotation_shape.hpp"
+#include "shared/wire/bad_field.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade::wire {
 namespace {
-
-absl::Status Bad(absl::string_view field, absl::string_view problem) {
-  return absl::InvalidArgumentError(absl::StrCat(field, ": ", problem));
-}
 
 /// What only some shapes have.
 absl::Status ReadMark(const v1::Annotation& message, absl::string_view field, Annotation& out) {
@@ -24,10 +21,10 @@ absl::Status ReadMark(const v1::Annotation& message, absl::string_view field, An
   out.length_m = message.length_m();
   out.length_sigma_m = message.length_sigma_m();
   if (!std::isfinite(out.length_m) || !std::isfinite(out.length_sigma_m)) {
-    return Bad(absl::StrCat(field, ".length_m"), "must be a finite number");
+    return BadField(absl::StrCat(field, ".length_m"), "must be a finite number");
   }
   if (out.shape == AnnotationShape::kMeasure && out.ink_offset_m.size() != 1) {
-    return Bad(absl::StrCat(field, ".ink_offset_m"), "a MEASURE has one other end");
+    return BadField(absl::StrCat(field, ".ink_offset_m"), "a MEASURE has one other end");
   }
   if (message.has_world_from_mark()) {
     const auto turn = FromProto(message.world_from_mark(), absl::StrCat(field, ".world_from_mark"));

@@ -4,14 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "shared/wire/bad_field.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade::wire {
 namespace {
-
-absl::Status Bad(absl::string_view field, absl::string_view problem) {
-  return absl::InvalidArgumentError(absl::StrCat(field, ": ", problem));
-}
 
 template <int N>
 absl::StatusOr<Eigen::Matrix<double, N, N>> Symmetric(
@@ -19,15 +16,15 @@ absl::StatusOr<Eigen::Matrix<double, N, N>> Symmetric(
   Eigen::Matrix<double, N, N> matrix = Eigen::Matrix<double, N, N>::Zero();
   if (upper.empty()) return matrix;
   if (upper.size() != N * (N + 1) / 2) {
-    return Bad(absl::StrCat(field, ".upper"),
-               absl::StrCat("needs ", N * (N + 1) / 2, " numbers, not ", upper.size()));
+    return BadField(absl::StrCat(field, ".upper"),
+                    absl::StrCat("needs ", N * (N + 1) / 2, " numbers, not ", upper.size()));
   }
   int next = 0;
   for (int row = 0; row < N; ++row) {
     for (int column = row; column < N; ++column) {
       const double value = upper[next++];
       if (!std::isfinite(value))
-        return Bad(absl::StrCat(field, ".upper"), "must be finite numbers");
+        return BadField(absl::StrCat(field, ".upper"), "must be finite numbers");
       matrix(row, column) = matrix(column, row) = value;
     }
   }
@@ -47,7 +44,7 @@ absl::StatusOr<TrackingStatus> StatusFromProto(v1::TrackingStatus status, absl::
     case v1::TRACKING_STATUS_RELOCALISING:
       return TrackingStatus::kRelocalising;
     default:
-      return Bad(field, absl::StrCat("unknown status ", static_cast<int>(status)));
+      return BadField(field, absl::StrCat("unknown status ", static_cast<int>(status)));
   }
 }
 
@@ -75,7 +72,7 @@ absl::StatusOr<AnchorState> AnchorStateFromProto(v1::AnchorState state, absl::st
     case v1::ANCHOR_STATE_STOPPED:
       return AnchorState::kStopped;
     default:
-      return Bad(field, absl::StrCat("unknown state ", static_cast<int>(state)));
+      return BadField(field, absl::StrCat("unknown state ", static_cast<int>(state)));
   }
 }
 
@@ -118,7 +115,8 @@ absl::StatusOr<Eigen::Quaterniond> FromProto(const v1::Quaternion& message,
                                              absl::string_view field) {
   const Eigen::Quaterniond rotation(message.w(), message.x(), message.y(), message.z());
   // Not >: NaN fails too.
-  if (!(std::abs(rotation.norm() - 1.0) < 1e-3)) return Bad(field, "must be a unit quaternion");
+  if (!(std::abs(rotation.norm() - 1.0) < 1e-3))
+    return BadField(field, "must be a unit quaternion");
   return rotation.normalized();
 }
 
@@ -143,15 +141,15 @@ absl::StatusOr<CameraIntrinsics> FromProto(const v1::CameraIntrinsics& message,
       out.model = LensModel::kFov, coefficients = 1;
       break;
     default:
-      return Bad(absl::StrCat(field, ".model"), "unknown lens model");
+      return BadField(absl::StrCat(field, ".model"), "unknown lens model");
   }
   if (message.width_px() == 0 || message.height_px() == 0 || message.width_px() > 16384 ||
       message.height_px() > 16384) {
-    return Bad(field, "width_px and height_px must be between 1 and 16384");
+    return BadField(field, "width_px and height_px must be between 1 and 16384");
   }
   if (static_cast<std::size_t>(message.distortion_size()) != coefficients) {
-    return Bad(absl::StrCat(field, ".distortion"),
-               absl::StrCat("this model has ", coefficients, " coefficients"));
+    return BadField(absl::StrCat(field, ".distortion"),
+                    absl::StrCat("this model has ", coefficients, " coefficients"));
   }
   out.width = static_cast<int>(message.width_px());
   out.height = static_cast<int>(message.height_px());
@@ -163,7 +161,7 @@ absl::StatusOr<CameraIntrinsics> FromProto(const v1::CameraIntrinsics& message,
     out.distortion[i] = message.distortion(static_cast<int>(i));
     finite = finite && std::isfinite(out.distortion[i]);
   }
-  if (!finite) return Bad(field, "numbers must be finite and focal lengths above 0");
+  if (!finite) return BadField(field, "numbers must be finite and focal lengths above 0");
   return out;
 }
 

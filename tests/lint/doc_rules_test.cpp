@@ -5,7 +5,7 @@
 #include <ostream>
 #include <string>
 
-namespace saccade::lint {
+namespace saccade::lint::doc_rules_test {
 namespace {
 
 const DocTree& SmallTree() {
@@ -45,7 +45,7 @@ struct Case {
 };
 void PrintTo(const Case& one, std::ostream* out) { *out << one.file << ": " << one.line; }
 
-class DocRule : public testing::TestWithParam<Case> {};
+class DocRule : public ::testing::TestWithParam<Case> {};
 
 TEST_P(DocRule, IsEnforced) {
   const Case& one = GetParam();
@@ -60,53 +60,55 @@ TEST_P(DocRule, IsEnforced) {
 constexpr const char* kReadme = "server/filter/README.md";
 
 INSTANTIATE_TEST_SUITE_P(LineLength, DocRule,
-                         testing::Values(Case{kReadme, std::string(110, 'a'), true},
-                                         Case{kReadme, std::string(111, 'a'), false},
-                                         Case{kReadme, "| " + std::string(120, 'a') + " |", true},
-                                         Case{"CHANGELOG.md", std::string(111, 'a'), false}));
+                         ::testing::Values(Case{kReadme, std::string(110, 'a'), true},
+                                           Case{kReadme, std::string(111, 'a'), false},
+                                           Case{kReadme, "| " + std::string(120, 'a') + " |", true},
+                                           Case{"CHANGELOG.md", std::string(111, 'a'), false}));
 
 INSTANTIATE_TEST_SUITE_P(
     References, DocRule,
-    testing::Values(Case{kReadme, "[spec](../../docs/spec.md)", true},
-                    Case{kReadme, "[spec](../../docs/spec.md#5-features)", true},
-                    Case{kReadme, "[spec](../docs/spec.md)", false},
-                    Case{kReadme, "[field](https://example.org/a)", true},
-                    Case{kReadme, "`server/filter/update.hpp` and `server/filter`", true},
-                    Case{kReadme, "`server/filter/update`", true},
-                    Case{kReadme, "`server/filter/upd*`", true},
-                    Case{kReadme, "`server/filter/gone.hpp`", false},
-                    Case{kReadme, "`server/FilterState`", false}, Case{kReadme, "`web/dist`", true},
-                    Case{"server/a.cpp", "// See server/filter/update.hpp.", true},
-                    Case{"server/a.cpp", "int a;  // server/filter/gone.hpp", false},
-                    Case{"server/a.cpp", "// See README: scale.", false}));
+    ::testing::Values(Case{kReadme, "[spec](../../docs/spec.md)", true},
+                      Case{kReadme, "[spec](../../docs/spec.md#5-features)", true},
+                      Case{kReadme, "[spec](../docs/spec.md)", false},
+                      Case{kReadme, "[field](https://example.org/a)", true},
+                      Case{kReadme, "`server/filter/update.hpp` and `server/filter`", true},
+                      Case{kReadme, "`server/filter/update`", true},
+                      Case{kReadme, "`server/filter/upd*`", true},
+                      Case{kReadme, "`server/filter/gone.hpp`", false},
+                      Case{kReadme, "`server/FilterState`", false},
+                      Case{kReadme, "`web/dist`", true},
+                      Case{"server/a.cpp", "// See server/filter/update.hpp.", true},
+                      Case{"server/a.cpp", "int a;  // server/filter/gone.hpp", false},
+                      Case{"server/a.cpp", "// See README: scale.", false}));
 
 INSTANTIATE_TEST_SUITE_P(
     Specification, DocRule,
-    testing::Values(Case{"server/a.hpp", "/// As slam-spec 5.3 has it.", true},
-                    Case{"server/a.hpp", "/// As slam-spec 5.4 has it.", false},
-                    Case{"server/a.hpp", "/// As slam-spec section 9.", true},
-                    Case{"server/a.hpp", "/// (slam-spec 5, 5.3, 7)", false},
-                    Case{"server/a.hpp", "/// (spec 14)", false},
-                    Case{"server/a.hpp", "/// (architecture, section 3)", true},
-                    Case{"server/a.hpp", "/// (architecture section 4)", false},
-                    Case{"server/a.hpp", "// T13: no depth from turning.", true},
-                    Case{"server/a.hpp", "// T47: not there.", false},
-                    Case{"docs/spec.md", "`Refine.LateEqualsAtOnce`", true},
-                    Case{"docs/spec.md", "`Refine.Late*`", true},
-                    Case{"docs/spec.md", "`Refine.Gone`", false},
-                    Case{"docs/spec.md", "`Gone.Test`", false},
-                    Case{kReadme, "`Refine.Gone`", false},
-                    Case{kReadme, "`MapService.Reset`", true}));
+    ::testing::Values(Case{"server/a.hpp", "/// As slam-spec 5.3 has it.", true},
+                      Case{"server/a.hpp", "/// As slam-spec 5.4 has it.", false},
+                      Case{"server/a.hpp", "/// As slam-spec section 9.", true},
+                      Case{"server/a.hpp", "/// (slam-spec 5, 5.3, 7)", false},
+                      Case{"server/a.hpp", "/// (spec 14)", false},
+                      Case{"server/a.hpp", "/// (architecture, section 3)", true},
+                      Case{"server/a.hpp", "/// (architecture section 4)", false},
+                      Case{"server/a.hpp", "// T13: no depth from turning.", true},
+                      Case{"server/a.hpp", "// T47: not there.", false},
+                      Case{"docs/spec.md", "`Refine.LateEqualsAtOnce`", true},
+                      Case{"docs/spec.md", "`Refine.Late*`", true},
+                      Case{"docs/spec.md", "`Refine.Gone`", false},
+                      Case{"docs/spec.md", "`Gone.Test`", false},
+                      Case{kReadme, "`Refine.Gone`", false},
+                      Case{kReadme, "`MapService.Reset`", true}));
 
 INSTANTIATE_TEST_SUITE_P(Figures, DocRule,
-                         testing::Values(Case{kReadme, "An update takes 3.4 ms.", false},
-                                         Case{kReadme, "It was 12 % too small.", false},
-                                         Case{kReadme, "Within 20px.", false},
-                                         Case{kReadme, "A click within `20 px`.", true},
-                                         Case{kReadme, "Six frames, 30 a second.", true},
-                                         Case{"docs/measurements/2026-11-22-a.md", "3.4 ms", true},
-                                         Case{"README.md", "3.4 ms", true},
-                                         Case{"docs/architecture.md", "3.4 ms", false}));
+                         ::testing::Values(Case{kReadme, "An update takes 3.4 ms.", false},
+                                           Case{kReadme, "It was 12 % too small.", false},
+                                           Case{kReadme, "Within 20px.", false},
+                                           Case{kReadme, "A click within `20 px`.", true},
+                                           Case{kReadme, "Six frames, 30 a second.", true},
+                                           Case{"docs/measurements/2026-11-22-a.md", "3.4 ms",
+                                                true},
+                                           Case{"README.md", "3.4 ms", true},
+                                           Case{"docs/architecture.md", "3.4 ms", false}));
 
 TEST(DocRule, AFoldersReadmeHasFortyLines) {
   std::string text;
@@ -121,4 +123,4 @@ TEST(DocRule, WithinAFenceNumbersAreNoFigures) {
 }
 
 }  // namespace
-}  // namespace saccade::lint
+}  // namespace saccade::lint::doc_rules_test

@@ -34,7 +34,7 @@ std::vector<std::string> Words(const std::string& text) {
   return {std::istream_iterator<std::string>(in), {}};
 }
 
-std::string FolderOf(string_view path) {
+std::string FolderOfFile(string_view path) {
   const auto slash = path.rfind('/');
   return std::string(slash == string_view::npos ? string_view() : path.substr(0, slash));
 }
@@ -111,7 +111,7 @@ std::vector<std::string> MissingLinks(const fs::path& root,
     }
     for (const std::string& file : files) {
       for (const std::string& include : ProjectIncludes(ReadText(root / file))) {
-        const std::string folder = FolderOf(include);
+        const std::string folder = FolderOfFile(include);
         if (folder == target.folder) continue;
         const auto owner = owners.find(include.substr(0, include.rfind('.')) + ".cpp");
         const std::set<std::string>& needed = owner == owners.end() ? homes[folder] : owner->second;

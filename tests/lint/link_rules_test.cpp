@@ -9,7 +9,7 @@
 
 #include "tests/lint/include_rules.hpp"
 
-namespace saccade::lint {
+namespace saccade::lint::link_rules_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -106,4 +106,4 @@ TEST(UnaryCalls, GoThroughOneHelper) {
 }
 
 }  // namespace
-}  // namespace saccade::lint
+}  // namespace saccade::lint::link_rules_test

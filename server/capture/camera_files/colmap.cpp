@@ -61,7 +61,7 @@ std::vector<Line> Cameras(absl::string_view text) {
   return lines;
 }
 
-bool Recognises(const CameraDocument& document) {
+bool RecognisesColmap(const CameraDocument& document) {
   const std::vector<Line> lines = Cameras(document.text);
   if (lines.empty() || lines[0].words.size() < 4) return false;
   const std::vector<absl::string_view>& words = lines[0].words;
@@ -128,7 +128,7 @@ absl::Status TakeParameters(const Model& model, const std::vector<absl::string_v
   return absl::OkStatus();
 }
 
-absl::Status Read(CameraDocument& document, CameraDraft& draft) {
+absl::Status ReadColmap(CameraDocument& document, CameraDraft& draft) {
   const absl::StatusOr<Line> line = Choose(document);
   if (!line.ok()) return line.status();
   const std::vector<absl::string_view>& words = line->words;
@@ -151,6 +151,6 @@ absl::Status Read(CameraDocument& document, CameraDraft& draft) {
 
 }  // namespace
 
-CameraForm ColmapForm() { return {"a COLMAP cameras.txt", Recognises, Read}; }
+CameraForm ColmapForm() { return {"a COLMAP cameras.txt", RecognisesColmap, ReadColmap}; }
 
 }  // namespace saccade

@@ -7,12 +7,12 @@
 namespace saccade {
 namespace {
 
-bool Recognises(const CameraDocument& document) {
+bool RecognisesEuroc(const CameraDocument& document) {
   const YamlReader& yaml = document.yaml;
   return yaml.IsList("intrinsics") && (yaml.Has("sensor_type") || yaml.Has("camera_model"));
 }
 
-absl::Status Read(CameraDocument& document, CameraDraft& draft) {
+absl::Status ReadEuroc(CameraDocument& document, CameraDraft& draft) {
   YamlReader& yaml = document.yaml;
   TakeResolution(yaml, "resolution", "", draft);
   const std::string model = yaml.Text("camera_model");
@@ -32,6 +32,6 @@ absl::Status Read(CameraDocument& document, CameraDraft& draft) {
 
 }  // namespace
 
-CameraForm EurocForm() { return {"an EuRoC sensor.yaml", Recognises, Read}; }
+CameraForm EurocForm() { return {"an EuRoC sensor.yaml", RecognisesEuroc, ReadEuroc}; }
 
 }  // namespace saccade

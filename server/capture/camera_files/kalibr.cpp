@@ -16,7 +16,7 @@ bool IsCamera(const YamlReader& yaml, const std::string& key) {
          yaml.IsMap(key);
 }
 
-bool Recognises(const CameraDocument& document) {
+bool RecognisesKalibr(const CameraDocument& document) {
   for (const std::string& key : document.yaml.Keys()) {
     if (IsCamera(document.yaml, key)) return true;
   }
@@ -62,7 +62,7 @@ void TakeOmni(YamlReader& yaml, const std::string& prefix, CameraDraft& draft) {
   draft.lens.cx = numbers[3], draft.lens.cy = numbers[4];
 }
 
-absl::Status Read(CameraDocument& document, CameraDraft& draft) {
+absl::Status ReadKalibr(CameraDocument& document, CameraDraft& draft) {
   draft.camera = Choose(document);
   const std::string prefix = draft.camera + ".";
   YamlReader yaml = document.yaml.Map(draft.camera);
@@ -87,6 +87,6 @@ absl::Status Read(CameraDocument& document, CameraDraft& draft) {
 
 }  // namespace
 
-CameraForm KalibrForm() { return {"a Kalibr camchain", Recognises, Read}; }
+CameraForm KalibrForm() { return {"a Kalibr camchain", RecognisesKalibr, ReadKalibr}; }
 
 }  // namespace saccade

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kMaxCoefficient = 1e6;  // a slip of the pen; lenses have less than 100
 
-bool Recognises(const CameraDocument&) { return true; }
+bool RecognisesNative(const CameraDocument&) { return true; }
 
 void TakeDistortion(YamlReader& yaml, CameraDraft& draft) {
   const std::string name = yaml.Text("model");
@@ -32,7 +32,7 @@ void TakeDistortion(YamlReader& yaml, CameraDraft& draft) {
   std::copy(distortion.begin(), distortion.end(), draft.lens.distortion.begin());
 }
 
-absl::Status Read(CameraDocument& document, CameraDraft& draft) {
+absl::Status ReadNative(CameraDocument& document, CameraDraft& draft) {
   YamlReader& yaml = document.yaml;
   yaml.AllowOnly({"model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "fps",
                   "rolling_shutter_readout_s", "T_body_camera"});
@@ -54,6 +54,6 @@ absl::Status Read(CameraDocument& document, CameraDraft& draft) {
 
 }  // namespace
 
-CameraForm NativeForm() { return {"camera.yaml", Recognises, Read}; }
+CameraForm NativeForm() { return {"camera.yaml", RecognisesNative, ReadNative}; }
 
 }  // namespace saccade

@@ -17,7 +17,7 @@ std::string DistortionKey(const YamlReader& yaml) {
                         "distCoeffs", "dist_coefs", "DistCoeffs", "D", "distCoeffs1", "D1"});
 }
 
-bool Recognises(const CameraDocument& document) {
+bool RecognisesOpencv(const CameraDocument& document) {
   return document.yaml.IsMap(MatrixKey(document.yaml));
 }
 
@@ -44,7 +44,7 @@ bool IsFisheye(YamlReader& yaml) {
   return yaml.Has("distortion_model") && yaml.Text("distortion_model") == "fisheye";
 }
 
-absl::Status Read(CameraDocument& document, CameraDraft& draft) {
+absl::Status ReadOpencv(CameraDocument& document, CameraDraft& draft) {
   YamlReader& yaml = document.yaml;
   const std::string width = FirstOf(yaml, {"image_width", "image_Width", "Image_Width", "width"});
   const std::string height =
@@ -66,6 +66,6 @@ absl::Status Read(CameraDocument& document, CameraDraft& draft) {
 
 }  // namespace
 
-CameraForm OpenCvForm() { return {"an OpenCV calibration", Recognises, Read}; }
+CameraForm OpenCvForm() { return {"an OpenCV calibration", RecognisesOpencv, ReadOpencv}; }
 
 }  // namespace saccade

@@ -8,7 +8,7 @@
 namespace saccade {
 namespace {
 
-bool Recognises(const CameraDocument& document) {
+bool RecognisesOrbSlam(const CameraDocument& document) {
   const YamlReader& yaml = document.yaml;
   return yaml.Has("Camera.fx") || yaml.Has("Camera1.fx") ||
          (yaml.Has("Camera.type") && yaml.Has("File.version"));
@@ -49,7 +49,7 @@ void TakeCoefficients(YamlReader& yaml, const std::string& camera, CameraDraft& 
   }
 }
 
-absl::Status Read(CameraDocument& document, CameraDraft& draft) {
+absl::Status ReadOrbSlam(CameraDocument& document, CameraDraft& draft) {
   YamlReader& yaml = document.yaml;
   const std::string camera = Choose(document), prefix = camera + ".";
   draft.camera = document.camera;
@@ -71,6 +71,6 @@ absl::Status Read(CameraDocument& document, CameraDraft& draft) {
 
 }  // namespace
 
-CameraForm OrbSlamForm() { return {"an ORB-SLAM settings file", Recognises, Read}; }
+CameraForm OrbSlamForm() { return {"an ORB-SLAM settings file", RecognisesOrbSlam, ReadOrbSlam}; }
 
 }  // namespace saccade

@@ -8,11 +8,11 @@
 #include <numbers>
 
 #include "server/capture/image_file.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kLeastView_deg = 1.0;   // of a telescope
 constexpr double kNarrowView_deg = 5.0;  // a long lens; a slip is likelier
 constexpr double kWideView_deg = 120.0;  // without being a fisheye: hardly sold

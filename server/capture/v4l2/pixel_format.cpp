@@ -9,28 +9,29 @@ namespace saccade {
 namespace {
 
 /// A view of the driver's bytes; OpenCV does not write into it.
-cv::Mat View(const PixelLayout& layout, int rows, int type, std::span<const std::uint8_t> bytes) {
+cv::Mat View(const V4l2Layout& layout, int rows, int type, std::span<const std::uint8_t> bytes) {
   return cv::Mat(rows, layout.width, type, const_cast<std::uint8_t*>(bytes.data()),
                  static_cast<std::size_t>(layout.stride));
 }
 
-Picture FromYuyv(const PixelLayout& layout, std::span<const std::uint8_t> bytes) {
+DecodedPicture FromYuyv(const V4l2Layout& layout, std::span<const std::uint8_t> bytes) {
   const cv::Mat pairs = View(layout, layout.height, CV_8UC2, bytes);
-  Picture picture;
+  DecodedPicture picture;
   cv::extractChannel(pairs, picture.grey, 0);
   cv::cvtColor(pairs, picture.color, cv::COLOR_YUV2BGR_YUYV);
   return picture;
 }
 
-Picture FromNv12(const PixelLayout& layout, std::span<const std::uint8_t> bytes) {
+DecodedPicture FromNv12(const V4l2Layout& layout, std::span<const std::uint8_t> bytes) {
   const cv::Mat planes = View(layout, layout.height * 3 / 2, CV_8UC1, bytes);
-  Picture picture;
+  DecodedPicture picture;
   picture.grey = planes.rowRange(0, layout.height).clone();
   cv::cvtColor(planes, picture.color, cv::COLOR_YUV2BGR_NV12);
   return picture;
 }
 
-absl::StatusOr<Picture> FromMjpeg(const PixelLayout& layout, std::span<const std::uint8_t> bytes) {
+absl::StatusOr<DecodedPicture> FromMjpeg(const V4l2Layout& layout,
+                                         std::span<const std::uint8_t> bytes) {
   const cv::Size size(layout.width, layout.height);
   return DecodePicture(bytes, [&](cv::Size is) {
     if (is == size) return absl::OkStatus();
@@ -41,7 +42,7 @@ absl::StatusOr<Picture> FromMjpeg(const PixelLayout& layout, std::span<const std
 
 }  // namespace
 
-std::size_t WholeBytes(const PixelLayout& layout) {
+std::size_t WholeBytes(const V4l2Layout& layout) {
   const std::size_t plane = static_cast<std::size_t>(layout.stride) * layout.height;
   switch (layout.fourcc) {
     case V4L2_PIX_FMT_YUYV:
@@ -54,8 +55,8 @@ std::size_t WholeBytes(const PixelLayout& layout) {
   }
 }
 
-absl::StatusOr<Picture> PictureFrom(const PixelLayout& layout,
-                                    std::span<const std::uint8_t> bytes) {
+absl::StatusOr<DecodedPicture> PictureFrom(const V4l2Layout& layout,
+                                           std::span<const std::uint8_t> bytes) {
   if (const std::size_t whole = WholeBytes(layout); bytes.size() < whole) {
     return absl::DataLossError(
         absl::StrCat("the picture is torn: ", bytes.size(), " of ", whole, " bytes"));
@@ -67,7 +68,7 @@ absl::StatusOr<Picture> PictureFrom(const PixelLayout& layout,
       case V4L2_PIX_FMT_NV12:
         return FromNv12(layout, bytes);
       case V4L2_PIX_FMT_GREY:
-        return Picture{View(layout, layout.height, CV_8UC1, bytes).clone(), {}};
+        return DecodedPicture{View(layout, layout.height, CV_8UC1, bytes).clone(), {}};
       default:
         return FromMjpeg(layout, bytes);
     }

@@ -43,7 +43,7 @@ class V4l2Camera {
                                                           std::unique_ptr<CaptureDevice> device);
   ~V4l2Camera();
 
-  const PixelLayout& layout() const { return layout_; }
+  const V4l2Layout& layout() const { return layout_; }
   double fps() const { return fps_; }  // 0: the driver does not say
   const std::string& name() const { return name_; }
 
@@ -64,7 +64,7 @@ class V4l2Camera {
   const Timestamp readout_ns_;
   std::unique_ptr<CaptureDevice> device_;
   std::string name_;
-  PixelLayout layout_;
+  V4l2Layout layout_;
   double fps_ = 0;
   std::vector<std::span<const std::uint8_t>> buffers_;
   bool streams_ = false;

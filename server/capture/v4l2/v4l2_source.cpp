@@ -50,7 +50,7 @@ class V4l2Source final : public CameraSource {
 
   absl::StatusOr<std::optional<Frame>> Next() override {
     while (std::optional<Numbered> next = TakeNewest()) {
-      absl::StatusOr<Picture> picture = PictureFrom(layout_, next->raw.bytes);
+      absl::StatusOr<DecodedPicture> picture = PictureFrom(layout_, next->raw.bytes);
       if (!picture.ok()) {
         const std::lock_guard lock(mutex_);
         ++counts_.torn;
@@ -60,7 +60,7 @@ class V4l2Source final : public CameraSource {
       frame.id = next->id;
       frame.capture_time_ns = next->raw.capture_ns;
       frame.received_time_ns = MonotonicNow();
-      Picture upright = Turned(*std::move(picture), request_.turn);
+      DecodedPicture upright = Turned(*std::move(picture), request_.turn);
       frame.grey = std::move(upright.grey);
       frame.color = std::move(upright.color);
       frame.camera = info_.camera;
@@ -197,7 +197,7 @@ class V4l2Source final : public CameraSource {
 
   const V4l2Request request_;
   const SourceInfo info_;
-  const PixelLayout layout_;
+  const V4l2Layout layout_;
   const double fps_;
   const OpenCaptureDevice open_;
 

@@ -19,10 +19,10 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kOpening(10'000);
 constexpr milliseconds kFileHangs(2'000), kStreamHangs(5'000);
-constexpr milliseconds kRetry(100), kMostRetry(2'000);
+constexpr milliseconds kDecoderRetry(100), kMostDecoderRetry(2'000);
 constexpr int kMostDeaths = 6;                      // one after the other, of a file
 constexpr std::int64_t kLeaveOut_ns = 500'000'000;  // where decoders die
-constexpr Timestamp kTellAgain_ns = 5'000'000'000;
+constexpr Timestamp kTellDecoderAgain_ns = 5'000'000'000;
 constexpr std::size_t kReadAhead = 4;       // frames
 constexpr std::size_t kMostReadAhead = 45;  // 1.5 s: what a new decoder may take to get there
 constexpr std::size_t kReadAheadBytes = std::size_t{64} << 20;
@@ -140,7 +140,7 @@ absl::Status DecodedSource::TakeFrame(const DecodeHeader& header, const std::sto
                     (colour || header.channels == 1) &&
                     header.size == std::size_t{header.width} * header.height * header.channels;
   if (!fits) return absl::UnavailableError("the decoder writes nonsense");
-  Picture picture;
+  DecodedPicture picture;
   try {
     cv::Mat pixels(static_cast<int>(header.height), static_cast<int>(header.width),
                    colour ? CV_8UC3 : CV_8UC1);
@@ -166,7 +166,8 @@ absl::Status DecodedSource::TakeFrame(const DecodeHeader& header, const std::sto
   return absl::OkStatus();
 }
 
-bool DecodedSource::Deliver(Picture picture, std::int64_t time_ns, const std::stop_token& stop) {
+bool DecodedSource::Deliver(DecodedPicture picture, std::int64_t time_ns,
+                            const std::stop_token& stop) {
   Frame frame;
   frame.id = next_id_++;
   if (frame.id < request_.first) return true;
@@ -198,7 +199,7 @@ absl::Status DecodedSource::Judge(const absl::Status& death, const std::stop_tok
   if (blamed) ++deaths_;
   const std::string where =
       live ? "" : absl::StrFormat(" at %.3f s", Seconds(std::max<Timestamp>(after_ns_, 0)));
-  if (attempts_ == 1 || MonotonicNow() - told_ns_ > kTellAgain_ns) {
+  if (attempts_ == 1 || MonotonicNow() - told_ns_ > kTellDecoderAgain_ns) {
     told_ns_ = MonotonicNow();
     Log(absl::StrCat("source ", info_.uri, where, ": ", death.message(), "; started anew"));
   }
@@ -212,7 +213,8 @@ absl::Status DecodedSource::Judge(const absl::Status& death, const std::stop_tok
     ++bad_;
   }
   if (attempts_ <= (killed ? 3 : 1) && !absl::IsResourceExhausted(death)) return absl::OkStatus();
-  const milliseconds wait = killed ? kRetry : std::min(attempts_ * kRetry, kMostRetry);
+  const milliseconds wait =
+      killed ? kDecoderRetry : std::min(attempts_ * kDecoderRetry, kMostDecoderRetry);
   std::mutex mutex;
   std::condition_variable_any never;
   std::unique_lock lock(mutex);

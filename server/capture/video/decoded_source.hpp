@@ -68,7 +68,7 @@ class DecodedSource final : public VideoSource {
   /// One message of the decoder at work. Cancelled: stopped; else it is of no more use.
   absl::Status ReadOn(const std::stop_token& stop);
   absl::Status TakeFrame(const DecodeHeader& header, const std::stop_token& stop);
-  bool Deliver(Picture picture, std::int64_t time_ns, const std::stop_token& stop);
+  bool Deliver(DecodedPicture picture, std::int64_t time_ns, const std::stop_token& stop);
   /// After a death: OK to go on. Waits a little, longer each time.
   absl::Status Judge(const absl::Status& death, const std::stop_token& stop);
   std::function<bool()> Stopped();

@@ -59,7 +59,7 @@ void SayDropped(const std::string& file, const std::vector<MarkerDrop>& dropped)
 }
 
 /// Grey, or where the detector asks for it and the file has it, in colour.
-cv::Mat ForDetector(const MarkerDetector& detector, const Picture& picture) {
+cv::Mat ForDetector(const MarkerDetector& detector, const DecodedPicture& picture) {
   return detector.needs_color() ? picture.color : picture.grey;
 }
 
@@ -76,7 +76,7 @@ void SayIfMirrored(const std::string& file, MarkerDetector& detector, const cv::
 absl::Status DetectEach(const std::vector<std::filesystem::path>& files, MarkerDetector& detector,
                         OutputFile& out, Tally& tally) {
   for (std::size_t k = 0; k < files.size(); ++k) {
-    const absl::StatusOr<Picture> picture = LoadPicture(files[k]);
+    const absl::StatusOr<DecodedPicture> picture = LoadPicture(files[k]);
     if (picture.ok()) {
       const std::string file = files[k].filename().string();
       const cv::Mat seen = ForDetector(detector, *picture);

@@ -5,12 +5,11 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
+#include "shared/geometry/angle.hpp"
 #include "shared/io/option_table.hpp"
 
 namespace saccade {
 namespace {
-
-constexpr double kDegree = M_PI / 180.0;
 
 const OptionTable<TeamSettings>& RunTable() {
   static const OptionTable<TeamSettings> table = {

@@ -22,7 +22,8 @@ std::optional<Aligned> Align(const Trajectory& estimate, const Trajectory& refer
     target.push_back(pair.truth.translation);
   }
   Aligned aligned;
-  aligned.reference_from_world = AlignPoints(source, target, Alignment::kSe3).target_from_source;
+  aligned.reference_from_world =
+      AlignPoints(source, target, TrajectoryAlignment::kSe3).target_from_source;
   double sum_m2 = 0.0, sum_rad2 = 0.0;
   for (const PosePair& pair : pairs) {
     const Rigid3 there = aligned.reference_from_world * pair.estimate;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "shared/geometry/angle.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kHuber = 2.0;           // sigmas
 constexpr double kOffsetSigma_m = 0.03;  // of the offsets given: along an axis nothing else tells
 constexpr double kDelaySigma_s = 0.2;

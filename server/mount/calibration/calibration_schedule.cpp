@@ -4,10 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "shared/geometry/angle.hpp"
+
 namespace saccade {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kEase_s = 1.0;             // at both ends of a part
 constexpr double kLeast_rad = 2 * kDegree;  // a joint that may move less is left alone

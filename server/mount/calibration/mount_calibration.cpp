@@ -9,11 +9,11 @@
 #include <optional>
 
 #include "server/mount/calibration/calibration_fit.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::size_t kLeastPictures = 100, kLeastReadings = 100;
 constexpr double kMoved_rad = 4 * kDegree;  // a joint that moved less says nothing of its axis
 constexpr double kOutlier_rad = 2 * kDegree;

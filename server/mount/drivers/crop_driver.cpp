@@ -9,8 +9,8 @@ namespace saccade {
 namespace {
 
 /// `size` is "WxH", or nothing: half of the picture.
-absl::StatusOr<OpenedMount> Open(const std::string& size, const MountOptions& /*model*/,
-                                 const MountContext& context) {
+absl::StatusOr<OpenedMount> OpenCrop(const std::string& size, const MountOptions& /*model*/,
+                                     const MountContext& context) {
   int width = context.camera.width / 4 * 2, height = context.camera.height / 4 * 2;
   const std::pair<std::string, std::string> parts = absl::StrSplit(size, absl::MaxSplits('x', 1));
   if (!size.empty() &&
@@ -33,7 +33,7 @@ MountDriver CropDriver() {
           .table = "",
           .describe = nullptr,
           .check = [](const std::string&, const MountFacts&) { return absl::OkStatus(); },
-          .open = Open};
+          .open = OpenCrop};
 }
 
 }  // namespace saccade

@@ -7,13 +7,13 @@ namespace {
 constexpr char kScheme[] = "dynamixel:";
 constexpr char kExample[] = "dynamixel:/dev/ttyUSB0";
 
-absl::Status Check(const std::string& rest, const MountFacts& facts) {
+absl::Status CheckDynamixel(const std::string& rest, const MountFacts& facts) {
   if (absl::Status device = NeedsADevice(rest, kScheme, kExample); !device.ok()) return device;
   return NeedsTheClock(facts);
 }
 
-absl::StatusOr<OpenedMount> Open(const std::string& rest, const MountOptions& model,
-                                 const MountContext& context) {
+absl::StatusOr<OpenedMount> OpenDynamixel(const std::string& rest, const MountOptions& model,
+                                          const MountContext& context) {
   DynamixelOptions options;
   absl::Status read;
   if (!context.config_file.empty()) read = options.LoadToml(context.config_file);
@@ -32,8 +32,8 @@ MountDriver DynamixelDriver() {
           .example = kExample,
           .table = "dynamixel",
           .describe = DynamixelOptions::Describe,
-          .check = Check,
-          .open = Open};
+          .check = CheckDynamixel,
+          .open = OpenDynamixel};
 }
 
 }  // namespace saccade

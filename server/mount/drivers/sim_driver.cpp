@@ -9,15 +9,15 @@
 namespace saccade {
 namespace {
 
-absl::Status Check(const std::string& /*rest*/, const MountFacts& facts) {
+absl::Status CheckSim(const std::string& /*rest*/, const MountFacts& facts) {
   if (!absl::StartsWith(facts.source, "sim:")) {
     return absl::InvalidArgumentError("--mount: sim turns the camera of a sim: source only");
   }
   return NeedsTheClock(facts);
 }
 
-absl::StatusOr<OpenedMount> Open(const std::string& rest, const MountOptions& model,
-                                 const MountContext& context) {
+absl::StatusOr<OpenedMount> OpenSim(const std::string& rest, const MountOptions& model,
+                                    const MountContext& context) {
   SimMountOptions options;
   options.wall_clock = true;
   options.seed = context.seed;
@@ -43,8 +43,8 @@ MountDriver SimDriver() {
           .example = "sim",
           .table = "",
           .describe = nullptr,
-          .check = Check,
-          .open = Open};
+          .check = CheckSim,
+          .open = OpenSim};
 }
 
 }  // namespace saccade

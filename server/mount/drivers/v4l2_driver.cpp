@@ -7,13 +7,13 @@ namespace {
 constexpr char kScheme[] = "v4l2:";
 constexpr char kExample[] = "v4l2:/dev/video0";
 
-absl::Status Check(const std::string& rest, const MountFacts& facts) {
+absl::Status CheckV4l2(const std::string& rest, const MountFacts& facts) {
   if (absl::Status device = NeedsADevice(rest, kScheme, kExample); !device.ok()) return device;
   return NeedsTheClock(facts);
 }
 
-absl::StatusOr<OpenedMount> Open(const std::string& rest, const MountOptions& model,
-                                 const MountContext& context) {
+absl::StatusOr<OpenedMount> OpenV4l2(const std::string& rest, const MountOptions& model,
+                                     const MountContext& context) {
   V4l2Options options;
   options.device = rest;
   if (!context.config_file.empty()) {
@@ -32,8 +32,8 @@ MountDriver V4l2Driver() {
           .example = kExample,
           .table = "v4l2",
           .describe = V4l2Options::Describe,
-          .check = Check,
-          .open = Open};
+          .check = CheckV4l2,
+          .open = OpenV4l2};
 }
 
 }  // namespace saccade

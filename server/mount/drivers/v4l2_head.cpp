@@ -5,16 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "server/mount/fixed_joint.hpp"
+#include "shared/geometry/angle.hpp"
 #include "shared/io/option_table.hpp"
 #include "shared/io/toml_table.hpp"
 
 namespace saccade {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kArcSecond = kDegree / 3600.0;  // unit of the absolute controls
 
 const OptionTable<V4l2Options>& Table() {

@@ -7,7 +7,7 @@
 #include "saccade/v1/session.pb.h"
 #include "tests/integration/attack/attack_test.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::identity_test {
 namespace {
 
 class Identity : public AttackTest {
@@ -164,4 +164,4 @@ TEST_F(Identity, NoTextWritesALineIntoTheLog) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::identity_test

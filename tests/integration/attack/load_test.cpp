@@ -6,7 +6,7 @@
 #include "saccade/v1/session.pb.h"
 #include "tests/integration/attack/attack_test.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::load_test {
 namespace {
 
 using Load = AttackTest;
@@ -150,4 +150,4 @@ TEST_F(Floods, WaitingForTheLeaseCostsSubscribersLittle) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::load_test

@@ -2,7 +2,7 @@
 #include "saccade/v1/annotation.pb.h"
 #include "tests/integration/attack/attack_test.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::malformed_test {
 namespace {
 
 using Malformed = AttackTest;
@@ -97,4 +97,4 @@ TEST_F(Malformed, ByteByByteHoldsNobodyUp) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::malformed_test

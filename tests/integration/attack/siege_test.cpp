@@ -8,7 +8,7 @@
 
 #include "tests/integration/attack/attack_test.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::siege_test {
 namespace {
 
 using Siege = AttackTest;
@@ -107,4 +107,4 @@ TEST_F(Siege, TheExpertLosesNothingAndTheServerIsAsBefore) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::siege_test

@@ -13,7 +13,7 @@
 #include "tests/integration/attack/attack_test.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::signal_test {
 namespace {
 
 // 2 s are promised on a quiet machine; a busy one may add its own.
@@ -163,4 +163,4 @@ TEST(Signals, UnreadLogHoldsNothingUp) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::signal_test

@@ -6,7 +6,7 @@
 #include "tests/integration/attack/attack_test.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::vanishing_test {
 namespace {
 
 using Vanishing = AttackTest;
@@ -133,4 +133,4 @@ TEST_F(Descriptors, BothPortsHealAfter256AndTheDataSetWaits) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::vanishing_test

@@ -10,7 +10,7 @@
 #include "tests/integration/bad_inputs/table.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::disk_test {
 namespace {
 
 AnnotationDraft Draft(int number) {
@@ -71,4 +71,4 @@ TEST(FullDisk, EditsAreRefusedAndWhatWasAnsweredStays) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::disk_test

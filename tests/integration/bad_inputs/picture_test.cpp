@@ -12,7 +12,7 @@
 #include "tests/integration/bad_inputs/bad_data_set.hpp"
 #include "tests/integration/bad_inputs/table.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::picture_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -132,4 +132,4 @@ TEST_F(BadDataSet, PictureOfAnotherSizeIsSkipped) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::picture_test

@@ -14,7 +14,7 @@
 #include "tests/integration/bad_inputs/table.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::rpc_test {
 namespace {
 
 using grpc::StatusCode;
@@ -341,4 +341,4 @@ TEST_F(BadRpc, SubscriptionsOutOfBoundsAreRefused) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::rpc_test

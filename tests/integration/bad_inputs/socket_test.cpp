@@ -14,7 +14,7 @@
 #include "tests/integration/bad_inputs/table.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::socket_test {
 namespace {
 
 int Port(std::string address) {
@@ -178,4 +178,4 @@ TEST_F(BadSocket, ClientsThatDieOrStopDisturbNobody) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::socket_test

@@ -9,7 +9,7 @@
 #include "tests/integration/bad_inputs/bad_data_set.hpp"
 #include "tests/integration/bad_inputs/table.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::start_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -196,4 +196,4 @@ TEST(BadStart, DataFolderAndPortsAreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::start_test

@@ -10,7 +10,7 @@
 
 #include "tests/integration/support/process.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::calibrate_camera_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -91,4 +91,4 @@ TEST(CalibrateCameraCommand, SaysWhatIsWrongWithTheBoard) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::calibrate_camera_test

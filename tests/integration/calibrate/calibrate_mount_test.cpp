@@ -14,7 +14,7 @@
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::calibrate_mount_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -150,4 +150,4 @@ TEST(CalibrateMountThroughPixels, TheRealTrackerTellsHowACrookedHeadIsBuilt) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::calibrate_mount_test

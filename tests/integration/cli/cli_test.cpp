@@ -17,7 +17,7 @@
 #include "tests/integration/support/process.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::cli_test {
 namespace {
 
 using nlohmann::json;
@@ -359,4 +359,4 @@ TEST_F(CommandLine, PortThatIsNotGrpcFailsClearly) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::cli_test

@@ -9,7 +9,7 @@
 
 #include "tests/integration/support/process.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::server_log_test {
 namespace {
 
 // Edits and refusals with who asked; of what only looks, and of heartbeats that are taken, nothing.
@@ -52,4 +52,4 @@ TEST(ServerLog, NamesEditsRefusalsAndWhoseTheyWere) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::server_log_test

@@ -19,7 +19,7 @@
 #include "shared/geometry/rigid3.hpp"
 #include "tests/integration/support/process.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::examples_test {
 namespace {
 
 using nlohmann::json;
@@ -201,4 +201,4 @@ TEST(Examples, TypeScriptNamesTheVersionsOfThePage) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::examples_test

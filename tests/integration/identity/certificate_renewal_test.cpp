@@ -15,7 +15,7 @@
 #include "tests/integration/identity/https_client.hpp"
 #include "tests/integration/identity/tls_socket.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::certificate_renewal_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -136,4 +136,4 @@ TEST(Renewal, OfAGivenCertificateComesWithItsFiles) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::certificate_renewal_test

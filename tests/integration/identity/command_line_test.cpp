@@ -14,7 +14,7 @@
 #include "server/identity/certificate.hpp"
 #include "tests/integration/identity/guarded_server.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::command_line_test {
 namespace {
 
 using std::chrono::seconds;
@@ -277,4 +277,4 @@ TEST_F(GuardedCommandLine, ASecondUserOfTheMachineGetsNothing) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::command_line_test

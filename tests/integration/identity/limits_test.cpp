@@ -15,7 +15,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::limits_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -282,4 +282,4 @@ TEST(Health, CheckIsOpenAndWatchAndReflectionAreNot) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::limits_test

@@ -11,7 +11,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/test_certificates.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::machines_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -158,4 +158,4 @@ TEST(ClientCa, IsCheckedAtTheStart) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::machines_test

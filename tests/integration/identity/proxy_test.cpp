@@ -5,7 +5,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::proxy_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -64,4 +64,4 @@ TEST(TrustedProxy, IsOneMachine) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::proxy_test

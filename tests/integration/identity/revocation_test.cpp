@@ -13,7 +13,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::revocation_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -196,4 +196,4 @@ TEST(Revocation, AStreamEndsWithTheLifeOfItsInvite) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::revocation_test

@@ -22,7 +22,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::role_table_test {
 namespace {
 
 using google::protobuf::MethodDescriptor;
@@ -281,4 +281,4 @@ TEST_F(RoleTable, ASessionBelongsToItsToken) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::role_table_test

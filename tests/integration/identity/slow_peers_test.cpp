@@ -14,7 +14,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/tls_socket.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::slow_peers_test {
 namespace {
 
 constexpr int kSlow = 25;  // of each kind: 50 readers, 75 writers
@@ -171,4 +171,4 @@ TEST(SlowPeers, CostNobodyElseOverTls) { SlowPeersCostNobodyElse(true); }
 TEST(SlowPeers, CostNobodyElseInPlain) { SlowPeersCostNobodyElse(false); }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::slow_peers_test

@@ -10,7 +10,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::tls_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -113,4 +113,4 @@ TEST_F(Tls, SecretsStandInNoLog) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::tls_test

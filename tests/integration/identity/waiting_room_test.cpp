@@ -8,7 +8,7 @@
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::waiting_room_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -147,4 +147,4 @@ TEST(WaitingInvite, NeedsInvites) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::waiting_room_test

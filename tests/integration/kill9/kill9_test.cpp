@@ -16,7 +16,7 @@
 #include "tests/integration/support/process.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::kill9_test {
 namespace {
 
 constexpr int kAnsweredEdits = 100;
@@ -132,4 +132,4 @@ TEST(Kill9, NothingThatWasAnsweredIsMissing) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::kill9_test

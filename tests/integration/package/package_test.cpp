@@ -7,7 +7,7 @@
 
 #include "tests/integration/support/process.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::package_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -94,4 +94,4 @@ TEST_F(Installed, ServerRunsFromThere) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::package_test

@@ -8,7 +8,7 @@
 
 #include "tests/integration/support/process.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::version_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -89,4 +89,4 @@ TEST_F(Commit, HeaderIsLeftAloneWhileTheCommitIsTheSame) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::version_test

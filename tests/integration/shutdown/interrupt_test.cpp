@@ -11,7 +11,7 @@
 #include "tests/integration/support/process.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::interrupt_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -145,4 +145,4 @@ TEST_F(Interrupt, NumbersThatAreNoneAreRefused) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::interrupt_test

@@ -11,7 +11,7 @@
 
 #include "tests/integration/support/process.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::memory_test {
 namespace {
 
 /// Resident memory of a process [MB]; 0 if it is gone.
@@ -46,4 +46,4 @@ TEST(Memory, AServerOnTheSimulatorHolds300MBWithItsRingFull) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::memory_test

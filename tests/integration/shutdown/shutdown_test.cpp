@@ -20,7 +20,7 @@
 #include "tests/integration/support/process.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::shutdown_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -316,4 +316,4 @@ TEST_F(ShutdownTest, FilesDeletedWhileItRunsAreThereAfterAKill) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::shutdown_test

@@ -12,7 +12,7 @@
 #include "client/session/session.hpp"
 #include "tests/integration/stream/in_process_server.hpp"
 
-namespace saccade {
+namespace saccade::client_session_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -215,4 +215,4 @@ TEST(ClientSession, AServerThatGoesIsMissedInWordsAndWhatWasToldStays) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::client_session_test

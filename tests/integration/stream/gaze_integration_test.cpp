@@ -11,7 +11,7 @@
 #include "tests/integration/stream/in_process_server.hpp"
 #include "tests/integration/stream/test_client.hpp"
 
-namespace saccade {
+namespace saccade::gaze_integration_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -315,4 +315,4 @@ TEST(Gaze, AnUnpluggedHeadIsToldAndComesBack) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::gaze_integration_test

@@ -7,7 +7,7 @@
 #include "tests/integration/stream/in_process_server.hpp"
 #include "tests/integration/stream/test_client.hpp"
 
-namespace saccade {
+namespace saccade::large_state_test {
 namespace {
 
 using testing::InProcessServer;
@@ -145,4 +145,4 @@ TEST_F(LargeState, MoreInkThanTheQuotaIsRefusedInWords) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::large_state_test

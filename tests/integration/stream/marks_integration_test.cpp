@@ -13,7 +13,7 @@
 #include "tests/integration/stream/test_client.hpp"
 #include "tests/integration/support/process.hpp"
 
-namespace saccade {
+namespace saccade::marks_integration_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -422,4 +422,4 @@ TEST(Marks, ChangesOfEveryFieldReachTheOthers) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::marks_integration_test

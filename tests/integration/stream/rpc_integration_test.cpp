@@ -12,7 +12,7 @@
 #include "tests/integration/stream/test_client.hpp"
 #include "tests/integration/support/process.hpp"
 
-namespace saccade {
+namespace saccade::rpc_integration_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -392,4 +392,4 @@ TEST(Rpc, MalformedAndOversizedRequestsAreRefusedAndTheServerLives) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::rpc_integration_test

@@ -9,7 +9,7 @@
 #include "tests/integration/stream/test_client.hpp"
 #include "tests/unit/server/scene/glb_builder.hpp"
 
-namespace saccade {
+namespace saccade::scene_integration_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -216,4 +216,4 @@ TEST_F(SceneCalls, ChangesComeOnTheStream) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::scene_integration_test

@@ -9,7 +9,7 @@
 #include "tests/integration/stream/test_client.hpp"
 #include "tests/integration/support/process.hpp"
 
-namespace saccade {
+namespace saccade::stream_integration_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -240,4 +240,4 @@ TEST(Stream, ShutdownEndsOpenStreamsWithinTwoSeconds) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::stream_integration_test

@@ -11,7 +11,7 @@
 #include "tests/integration/stream/in_process_server.hpp"
 #include "tests/integration/stream/test_client.hpp"
 
-namespace saccade {
+namespace saccade::talk_integration_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -368,4 +368,4 @@ TEST(Talk, WhatIsNoVoiceIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::talk_integration_test

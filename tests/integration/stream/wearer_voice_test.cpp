@@ -18,7 +18,7 @@
 #include "tests/integration/support/process.hpp"
 #include "tests/unit/shared/audio/tones.hpp"
 
-namespace saccade {
+namespace saccade::wearer_voice_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -282,4 +282,4 @@ TEST_F(WearerVoiceTest, TheDesktopHearsWithoutAMicrophoneAndSaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::wearer_voice_test

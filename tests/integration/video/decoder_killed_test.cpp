@@ -14,7 +14,7 @@
 #include "tests/integration/support/process.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::decoder_killed_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -80,4 +80,4 @@ TEST(DecoderKilled, TwentyTimesNoFrameOfTheServerIsASecondLate) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::decoder_killed_test

@@ -12,7 +12,7 @@
 #include "server/capture/video/video_source.hpp"
 #include "tests/integration/support/process.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::rtsp_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -142,4 +142,4 @@ TEST(Record, APhoneIsRefusedWithWhatToDoInstead) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::rtsp_test

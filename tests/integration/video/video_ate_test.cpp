@@ -14,7 +14,7 @@
 #include "tests/integration/support/process.hpp"
 #include "tests/integration/support/small_dataset.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::video_ate_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -107,4 +107,4 @@ TEST_F(VideoOfARecording, IsTrackedAsItsPicturesAre) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::video_ate_test

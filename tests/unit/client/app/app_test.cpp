@@ -12,7 +12,7 @@
 #include "client/app/settings.hpp"
 #include "client/app/snapshot.hpp"
 
-namespace saccade::app {
+namespace saccade::app::app_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -116,4 +116,4 @@ TEST(Snapshot, HasItsFactsInsideAndIsStillAPng) {
 }
 
 }  // namespace
-}  // namespace saccade::app
+}  // namespace saccade::app::app_test

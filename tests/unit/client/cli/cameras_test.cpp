@@ -4,7 +4,7 @@
 
 #include "client/cli/cameras_command.hpp"
 
-namespace saccade::cli {
+namespace saccade::cli::cameras_test {
 namespace {
 
 using ::testing::AllOf;
@@ -39,4 +39,4 @@ TEST(Cameras, JsonHasEveryMode) {
 }
 
 }  // namespace
-}  // namespace saccade::cli
+}  // namespace saccade::cli::cameras_test

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace saccade::cli {
+namespace saccade::cli::options_test {
 namespace {
 
 ParseResult Parse(const std::vector<const char*>& arguments) {
@@ -185,4 +185,4 @@ TEST(CommandLine, AnnotationsMeansListUnlessToldOtherwise) {
 }
 
 }  // namespace
-}  // namespace saccade::cli
+}  // namespace saccade::cli::options_test

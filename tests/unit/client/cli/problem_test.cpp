@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade::cli {
+namespace saccade::cli::problem_test {
 namespace {
 
 std::string Say(const Options& options, const std::string& message) {
@@ -77,4 +77,4 @@ TEST(Problem, IsJsonWhereAnswersAre) {
 }
 
 }  // namespace
-}  // namespace saccade::cli
+}  // namespace saccade::cli::problem_test

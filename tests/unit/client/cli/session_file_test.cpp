@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-namespace saccade::cli {
+namespace saccade::cli::session_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -100,4 +100,4 @@ TEST_F(SessionFile, APersonsKeyIsMadeOnceForServerAndNameAndForItsUserAlone) {
 }
 
 }  // namespace
-}  // namespace saccade::cli
+}  // namespace saccade::cli::session_file_test

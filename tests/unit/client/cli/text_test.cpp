@@ -6,7 +6,7 @@
 
 #include "client/net/connection.hpp"
 
-namespace saccade::cli {
+namespace saccade::cli::text_test {
 namespace {
 
 TEST(Table, PadsByCharactersNotBytes) {
@@ -140,4 +140,4 @@ TEST(RandomUuid, HasTheFormOfVersionFourAndDoesNotRepeat) {
 }
 
 }  // namespace
-}  // namespace saccade::cli
+}  // namespace saccade::cli::text_test

@@ -10,7 +10,7 @@
 
 #include "server/encode/video_encoder.hpp"
 
-namespace saccade::decode {
+namespace saccade::decode::player_test {
 namespace {
 
 /// The pictures of a moving bar, coded: picture i has its bar at column 4 i, and frame id i.
@@ -102,4 +102,4 @@ TEST(Player, ANewSubscriptionForgetsTheOldOnesPictures) {
 }
 
 }  // namespace
-}  // namespace saccade::decode
+}  // namespace saccade::decode::player_test

@@ -12,7 +12,7 @@
 #include "saccade/v1/annotation.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 
-namespace saccade::net {
+namespace saccade::net::parts_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -141,4 +141,4 @@ TEST(Parts, AMapThatCameInPartSaysSo) {
 }
 
 }  // namespace
-}  // namespace saccade::net
+}  // namespace saccade::net::parts_test

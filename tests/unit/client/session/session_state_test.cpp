@@ -6,7 +6,7 @@
 #include "client/session/pointing.hpp"
 #include "client/session/state.hpp"
 
-namespace saccade::session {
+namespace saccade::session::session_state_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -256,4 +256,4 @@ TEST(Latency, StagesSumToTheWholeAndNeedTheClock) {
 }
 
 }  // namespace
-}  // namespace saccade::session
+}  // namespace saccade::session::session_state_test

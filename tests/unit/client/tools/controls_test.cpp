@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-namespace saccade::tools {
+namespace saccade::tools::controls_test {
 namespace {
 
 /// label -> key, of one of the page's own tables.
@@ -80,4 +80,4 @@ TEST(Controls, KeysWithModifiersAreNotTools) {
 }
 
 }  // namespace
-}  // namespace saccade::tools
+}  // namespace saccade::tools::controls_test

@@ -8,7 +8,7 @@
 #include "client/tools/orbit.hpp"
 #include "client/tools/plane.hpp"
 
-namespace saccade::tools {
+namespace saccade::tools::landing_test {
 namespace {
 
 constexpr double kFov = 0.8;
@@ -129,4 +129,4 @@ TEST(Orbit, EasesToItsGoalWithinAQuarterOfASecondAndKeepsWhatIsUnderThePointer) 
 }
 
 }  // namespace
-}  // namespace saccade::tools
+}  // namespace saccade::tools::landing_test

@@ -7,7 +7,7 @@
 #include "client/tools/words.hpp"
 #include "client/tools/written.hpp"
 
-namespace saccade::tools {
+namespace saccade::tools::marks_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -133,4 +133,4 @@ TEST(StatusWords, SayWhatIsWrongAndWhatToDo) {
 }
 
 }  // namespace
-}  // namespace saccade::tools
+}  // namespace saccade::tools::marks_test

@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-namespace saccade::tools {
+namespace saccade::tools::turn_test {
 namespace {
 
 using Eigen::Quaterniond;
@@ -78,4 +78,4 @@ TEST(Turn, ABoxHasItsHandleAboveItAndANoteNone) {
 }
 
 }  // namespace
-}  // namespace saccade::tools
+}  // namespace saccade::tools::turn_test

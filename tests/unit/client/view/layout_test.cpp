@@ -14,7 +14,7 @@
 #include "client/view/picture_file.hpp"
 #include "client/view/theme.hpp"
 
-namespace saccade::view {
+namespace saccade::view::layout_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -153,4 +153,4 @@ TEST_F(PictureFile, WhatIsNoneIsRefusedInWords) {
 }
 
 }  // namespace
-}  // namespace saccade::view
+}  // namespace saccade::view::layout_test

@@ -10,7 +10,7 @@
 #include "shared/scene/limits.hpp"
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::click_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -226,4 +226,4 @@ TEST(Click, RayFromTheMapViewMeetsTheSurface) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::click_test

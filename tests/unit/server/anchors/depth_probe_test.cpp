@@ -6,13 +6,13 @@
 
 #include "server/sim/sim_source.hpp"
 
-namespace saccade {
+namespace saccade::depth_probe_test {
 namespace {
 
 constexpr FrameId kClicked = 150, kEnd = 156;
 
 /// The simulated room seen by a tracker that makes no mistakes.
-class DepthProbe : public testing::Test {
+class DepthProbe : public ::testing::Test {
  protected:
   void Open(const std::string& uri) {
     auto source = SimSource::OpenUri(uri, SourceOptions{});
@@ -94,4 +94,4 @@ TEST(JoinDepth, WeighsWhatAgreesAndReplacesWhatDoesNot) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::depth_probe_test

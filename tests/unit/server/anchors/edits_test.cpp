@@ -3,7 +3,7 @@
 
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::edits_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -174,4 +174,4 @@ TEST_F(Edits, UnknownIdsAndEmptyPatchesAreNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::edits_test

@@ -6,7 +6,7 @@
 #include <ctime>
 #include <opencv2/imgproc.hpp>
 
-namespace saccade {
+namespace saccade::frame_ring_test {
 namespace {
 
 constexpr int kSize = 100;
@@ -206,4 +206,4 @@ TEST(FrameRing, AClockSetBackLeavesNothingOfTheTimeBefore) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::frame_ring_test

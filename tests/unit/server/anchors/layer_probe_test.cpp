@@ -11,7 +11,7 @@
 #include "server/anchors/anchor_manager.hpp"
 #include "server/anchors/depth_probe.hpp"
 
-namespace saccade {
+namespace saccade::layer_probe_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -242,4 +242,4 @@ TEST(Layers, AMarkOnAFlatSurfaceIsTrusted) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::layer_probe_test

@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::many_strokes_test {
 namespace {
 
 using testing::LookFrom;
@@ -83,4 +83,4 @@ TEST(ManyStrokes, NoFrameTakesTheWorkOfManyUponItself) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::many_strokes_test

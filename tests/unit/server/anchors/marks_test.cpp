@@ -6,7 +6,7 @@
 
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::marks_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -278,4 +278,4 @@ TEST_F(Marks, PicturesCountAndAreBounded) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::marks_test

@@ -9,7 +9,7 @@
 
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::measure_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -184,4 +184,4 @@ TEST(JoinEnds, IsAsBadAsTheWorse) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::measure_test

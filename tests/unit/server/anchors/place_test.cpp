@@ -7,7 +7,7 @@
 #include "server/anchors/rigid_fit.hpp"
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::place_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -315,4 +315,4 @@ TEST(RigidFit, RecoversAnyTransform) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::place_test

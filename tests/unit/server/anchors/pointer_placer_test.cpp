@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::pointer_placer_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -86,4 +86,4 @@ TEST_F(Placer, IsQuick) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::pointer_placer_test

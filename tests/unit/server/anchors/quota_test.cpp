@@ -6,7 +6,7 @@
 
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::quota_test {
 namespace {
 
 using ::testing::AllOf;
@@ -144,4 +144,4 @@ TEST(DefaultQuotas, HoldNinetyStrokesOf2000PointsAndAThousandMarks) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::quota_test

@@ -9,7 +9,7 @@
 
 #include "server/anchors/anchor_place.hpp"
 
-namespace saccade {
+namespace saccade::scale_chain_test {
 namespace {
 
 constexpr double kRadiansPerPx = 1.0 / 500;
@@ -129,4 +129,4 @@ TEST(ScaleChain, AMarkClaimsNoBetterThanThePartItHangsIn) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::scale_chain_test

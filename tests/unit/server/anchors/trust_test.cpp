@@ -9,7 +9,7 @@
 #include "shared/scene/length_text.hpp"
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::trust_test {
 namespace {
 
 using ::testing::ContainsRegex;
@@ -194,4 +194,4 @@ TEST(Trust, LengthsAreSaidInTheirOwnUnit) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::trust_test

@@ -5,7 +5,7 @@
 
 #include "tests/unit/server/anchors/rig.hpp"
 
-namespace saccade {
+namespace saccade::undo_memory_test {
 namespace {
 
 using testing::LookFrom;
@@ -102,4 +102,4 @@ TEST_F(UndoMemory, ForgettingAPersonGivesItsBytesBack) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::undo_memory_test

@@ -7,7 +7,7 @@
 #include "shared/geometry/so3.hpp"
 #include "tests/support/pinhole.hpp"
 
-namespace saccade {
+namespace saccade::crop_view_test {
 namespace {
 
 CameraIntrinsics Real() {
@@ -71,4 +71,4 @@ TEST(CropView, TheGuidanceArrowIsAtTheEdgeItPointsTo) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::crop_view_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::frame_clock_test {
 namespace {
 
 constexpr Timestamp kMs = 1'000'000;
@@ -55,4 +55,4 @@ TEST(FrameClock, WithoutPaceAFrameIsCapturedWhenItArrives) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::frame_clock_test

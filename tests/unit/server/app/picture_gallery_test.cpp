@@ -9,7 +9,7 @@
 
 #include "server/app/picture_reader.hpp"
 
-namespace saccade {
+namespace saccade::picture_gallery_test {
 namespace {
 
 PicturePtr Green() {
@@ -44,4 +44,4 @@ TEST(PictureGallery, AStillHasThePictureAtOnce) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::picture_gallery_test

@@ -9,7 +9,7 @@
 
 #include "shared/scene/limits.hpp"
 
-namespace saccade {
+namespace saccade::picture_reader_test {
 namespace {
 
 using ::testing::AllOf;
@@ -128,4 +128,4 @@ TEST(PictureReader, SurvivesDamage) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::picture_reader_test

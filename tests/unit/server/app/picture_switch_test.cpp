@@ -9,7 +9,7 @@
 #include <fstream>
 #include <future>
 
-namespace saccade {
+namespace saccade::picture_switch_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -135,4 +135,4 @@ TEST_F(PictureSwitchTest, TellsOfAChangeBeforeItIsAnswered) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::picture_switch_test

@@ -11,7 +11,7 @@
 #include "server/mount/drivers/drivers.hpp"
 #include "server/tracker/tracker_options.hpp"
 
-namespace saccade {
+namespace saccade::server_config_test {
 namespace {
 
 using ::testing::AllOf;
@@ -223,4 +223,4 @@ TEST(ServerConfig, VersionPrintsAndGivesNothing) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::server_config_test

@@ -13,7 +13,7 @@
 #include "server/mount/drivers/drivers.hpp"
 #include "server/tracker/tracker_options.hpp"
 
-namespace saccade {
+namespace saccade::shipped_config_test {
 namespace {
 
 constexpr char kShipped[] = SACCADE_SOURCE_DIR "/deploy/debian/saccade.toml";
@@ -66,4 +66,4 @@ TEST(ShippedConfig, LinesWithANumberSignAreTheDefaults) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::shipped_config_test

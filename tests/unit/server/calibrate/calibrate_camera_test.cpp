@@ -4,7 +4,7 @@
 #include "server/calibrate/lens_report.hpp"
 #include "tests/unit/server/calibrate/rendered_board.hpp"
 
-namespace saccade {
+namespace saccade::calibrate_camera_test {
 namespace {
 
 using testing::BoardCamera;
@@ -148,4 +148,4 @@ TEST(Board, IsReadOrRefusedWithWhatToCount) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::calibrate_camera_test

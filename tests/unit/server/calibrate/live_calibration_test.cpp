@@ -18,7 +18,7 @@
 #include "server/calibrate/calibration_desk.hpp"
 #include "server/capture/camera_file.hpp"
 
-namespace saccade {
+namespace saccade::live_calibration_test {
 namespace {
 
 using ::testing::AllOf;
@@ -257,4 +257,4 @@ TEST(LensTarget, WhatIsNoneIsRefusedWithWhatToWrite) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::live_calibration_test

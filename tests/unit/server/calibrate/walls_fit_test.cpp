@@ -8,7 +8,7 @@
 #include <opencv2/aruco.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace saccade {
+namespace saccade::walls_fit_test {
 namespace {
 
 using ::testing::AllOf;
@@ -138,4 +138,4 @@ TEST_F(Walls, BadFilesAreRefusedByFieldAndRemedy) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::walls_fit_test

@@ -9,11 +9,11 @@
 #include "server/capture/dataset.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::camera_forms_test {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 class CameraForms : public DatasetFixture {
  protected:
@@ -549,4 +549,4 @@ TEST_F(CameraForms, AFormThatHasNoWordsForALensSaysWhichHas) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::camera_forms_test

@@ -11,7 +11,7 @@
 namespace saccade {
 
 /// A small, whole data set in a folder of its own, for tests to damage.
-class DatasetFixture : public testing::Test {
+class DatasetFixture : public ::testing::Test {
  protected:
   static constexpr int kWidth = 64, kHeight = 48, kFrames = 6;
 

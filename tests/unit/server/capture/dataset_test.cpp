@@ -7,12 +7,12 @@
 #include "shared/io/log.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::dataset_test {
 namespace {
 
-using testing::AllOf;
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 class Dataset : public DatasetFixture {
  protected:
@@ -70,10 +70,10 @@ TEST_F(Dataset, BadPicturesAreSkippedCountedAndKeepTheirId) {
   Write("rgb/4.png", "");
   auto source = Open();
   FlushLog(std::chrono::seconds(5));  // of the tests before
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   EXPECT_THAT(Ids(*source), ElementsAre(5));
   FlushLog(std::chrono::seconds(5));
-  const std::string said = testing::internal::GetCapturedStderr();
+  const std::string said = ::testing::internal::GetCapturedStderr();
   EXPECT_EQ(source->bad_frames(), 5);
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 5) << said;
   EXPECT_THAT(said, AllOf(HasSubstr("frame 0 skipped"), HasSubstr("rgb/1.jpg: the JPEG is trunc"),
@@ -199,10 +199,10 @@ TEST_F(Dataset, APauseIsToldWithItsLineAndNobodyWaitsForAnHour) {
   Write("rgb.txt", "# head\n0 rgb/0.png\n0.01 rgb/1.jpg\n3600.02 rgb/2.png\n3600.03 rgb/3.jpg\n");
   SourceOptions options;
   options.realtime = true;
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   auto source = Open(options);
   FlushLog(std::chrono::seconds(2));
-  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(),
               AllOf(HasSubstr("rgb.txt:4: a pause of 3600.01 s"), HasSubstr("frame 2"),
                     HasSubstr("tracking starts anew")));
   const Timestamp begin = MonotonicNow();
@@ -256,4 +256,4 @@ TEST(Recordings, EveryOneOpens) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::dataset_test

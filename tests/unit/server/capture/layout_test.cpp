@@ -8,7 +8,7 @@
 #include "server/capture/dataset.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::layout_test {
 namespace {
 
 using ::testing::AllOf;
@@ -152,4 +152,4 @@ TEST_F(Layout, PicturesAloneNeedARateAndListsDoNot) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::layout_test

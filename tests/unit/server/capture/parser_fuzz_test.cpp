@@ -7,7 +7,7 @@
 #include "server/capture/target_file.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::parser_fuzz_test {
 namespace {
 
 /// Damages whole files at random (fixed seeds): a parser may refuse or accept, but must answer with
@@ -114,4 +114,4 @@ TEST_F(ParserFuzz, Picture) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::parser_fuzz_test

@@ -7,11 +7,11 @@
 #include "server/capture/target_file.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::parsers_test {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 TEST(ParseSeconds, IsExactToTheNanosecond) {
   EXPECT_EQ(ParseSeconds("1305031102.175304").value(), 1305031102175304000);
@@ -287,4 +287,4 @@ TEST_F(Parsers, StartRefusesAQuaternionThatIsNotUnit) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::parsers_test

@@ -12,10 +12,10 @@
 #include "server/capture/phone/phone_source.hpp"
 #include "tests/unit/server/capture/phone_fixture.hpp"
 
-namespace saccade {
+namespace saccade::phone_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr Timestamp kMs = 1'000'000;
 
@@ -385,4 +385,4 @@ TEST(PhoneSource, PicturesThatAreTooLargeEndNoDecoder) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::phone_test

@@ -14,12 +14,12 @@
 #include "shared/io/log.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::picture_test {
 namespace {
 
-using testing::AllOf;
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 class Pictures : public DatasetFixture {
  protected:
@@ -156,14 +156,14 @@ class NoDescriptors {
   rlimit before_{};
 };
 
-class Descriptors : public Pictures, public testing::WithParamInterface<bool> {};
+class Descriptors : public Pictures, public ::testing::WithParamInterface<bool> {};
 
 // Before: each frame was skipped in a moment ("cannot be read"), to the end of the data set.
 TEST_P(Descriptors, TheSourceWaitsForOneAndGoesOnWithTheSameFrame) {
   auto source = Open(GetParam());
   std::vector<FrameId> ids;
   FlushLog(std::chrono::seconds(5));  // of the tests before
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   std::optional<NoDescriptors> none(std::in_place);
   std::jthread reader([&] {
     for (auto frame = source->Next(); frame.ok() && *frame; frame = source->Next()) {
@@ -174,7 +174,7 @@ TEST_P(Descriptors, TheSourceWaitsForOneAndGoesOnWithTheSameFrame) {
   none.reset();
   reader.join();
   FlushLog(std::chrono::seconds(5));
-  const std::string said = testing::internal::GetCapturedStderr();
+  const std::string said = ::testing::internal::GetCapturedStderr();
   EXPECT_EQ(ids.front(), 0);
   EXPECT_EQ(ids.back(), 5);
   if (!GetParam()) {
@@ -198,8 +198,8 @@ TEST_P(Descriptors, AWaitingSourceStopsAtOnce) {
   EXPECT_EQ(source->bad_frames(), 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Both, Descriptors, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Both, Descriptors, ::testing::Bool(),
                          [](const auto& each) { return each.param ? "Realtime" : "EveryFrame"; });
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::picture_test

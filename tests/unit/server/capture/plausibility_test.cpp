@@ -7,13 +7,13 @@
 #include "server/capture/dataset.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::plausibility_test {
 namespace {
 
-using testing::AllOf;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 CameraIntrinsics Good() {
   return {.model = LensModel::kBrownConrady,
@@ -107,9 +107,9 @@ TEST_F(Plausibility, CentreOnTheEdgeExchangedOrOfAnotherSize) {
   EXPECT_THAT(centre(159.3, 127.6).error,
               AllOf(HasSubstr("middle of a picture of about 319 x 255"), HasSubstr("fx: 10")));
   EXPECT_THAT(centre(-40, 255.3).warnings,
-              testing::Contains(HasSubstr("cx: -40 is outside the picture")));
+              ::testing::Contains(HasSubstr("cx: -40 is outside the picture")));
   EXPECT_THAT(centre(700, 255.3).warnings,
-              testing::Contains(HasSubstr("cx: 700 is outside the picture")));
+              ::testing::Contains(HasSubstr("cx: 700 is outside the picture")));
   EXPECT_THAT(centre(-700, 255.3).error, HasSubstr("cx: -700 is out of range"));
 }
 
@@ -123,12 +123,12 @@ TEST_F(Plausibility, CoefficientsInAnotherOrder) {
   EXPECT_THAT(bent({-0.0054, 0.0026, 0.2624, -0.9531, 1.1633}).error,
               AllOf(HasSubstr("p1 = 0.2624"), HasSubstr("[k1, k2, p1, p2, k3]")));
   EXPECT_THAT(bent({-0.28, 0.07, 0.0, 0.0002, 1.7e-05}).warnings,
-              testing::Contains(HasSubstr("[-0.28, 0.07, 0.0002, 1.7e-05, 0]")));
+              ::testing::Contains(HasSubstr("[-0.28, 0.07, 0.0002, 1.7e-05, 0]")));
   EXPECT_THAT(bent({-0.02, 0.09, -0.11, 0.04, 0}).error,
               AllOf(HasSubstr("equidistant"), HasSubstr("kannala_brandt"),
                     HasSubstr("[-0.02, 0.09, -0.11, 0.04]")));
   EXPECT_THAT(bent({-0.02, 0.011, -0.02, 0.0008, 0}).warnings,
-              testing::Contains(HasSubstr("kannala_brandt")));
+              ::testing::Contains(HasSubstr("kannala_brandt")));
 }
 
 TEST_F(Plausibility, EquidistantLensCalledBrownConrady) {
@@ -189,4 +189,4 @@ TEST_F(Plausibility, PicturesOfAnotherSizeAreToldTheWholeFile) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::plausibility_test

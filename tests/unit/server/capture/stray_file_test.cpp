@@ -9,13 +9,13 @@
 #include "server/capture/image_list.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::stray_file_test {
 namespace {
 
 using std::string_literals::operator""s;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 const std::string kLfs =
     "version https://git-lfs.github.com/spec/v1\n"
@@ -104,4 +104,4 @@ TEST_F(StrayFile, OddNamesThatAreRightAreRead) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::stray_file_test

@@ -96,7 +96,7 @@ inline SourceOptions Live(const std::string& file = "") {
   return options;
 }
 
-class V4l2 : public testing::Test {
+class V4l2 : public ::testing::Test {
  protected:
   void UseFormat(std::uint32_t fourcc) { camera_->modes = {{fourcc, kWidth, kHeight, {30, 15}}}; }
   absl::StatusOr<std::unique_ptr<CameraSource>> Open(const std::string& query = "",

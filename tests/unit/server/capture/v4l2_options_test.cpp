@@ -9,7 +9,7 @@
 #include "shared/io/video_modes.hpp"
 #include "tests/unit/server/capture/v4l2_fixture.hpp"
 
-namespace saccade {
+namespace saccade::v4l2_options_test {
 namespace {
 
 using ::testing::AllOf;
@@ -135,7 +135,7 @@ TEST_F(V4l2, TurnsAndMirrorsPicturesAndLens) {
 }
 
 TEST_F(V4l2, CameraFileDecidesTheModeOrIsRefused) {
-  const std::string file = testing::TempDir() + "v4l2-camera.yaml";
+  const std::string file = ::testing::TempDir() + "v4l2-camera.yaml";
   std::ofstream(file) << "model: pinhole\nwidth: 96\nheight: 128\nfx: 110\nfy: 110\n"
                          "cx: 47\ncy: 63\nfps: 30\n";
   camera_->modes = {{V4L2_PIX_FMT_YUYV, 64, 48, {30}}, {V4L2_PIX_FMT_YUYV, 128, 96, {30}}};
@@ -150,7 +150,7 @@ TEST_F(V4l2, CameraFileDecidesTheModeOrIsRefused) {
 }
 
 TEST(VideoDevices, AreListedInOrderWithWhatIsWrongWithThem) {
-  const std::filesystem::path folder = testing::TempDir() + "devices";
+  const std::filesystem::path folder = ::testing::TempDir() + "devices";
   std::filesystem::create_directories(folder);
   for (const char* name : {"video10", "video2", "video0", "videogame", "null"}) {
     std::ofstream(folder / name) << "";
@@ -170,4 +170,4 @@ TEST(VideoDevices, AreListedInOrderWithWhatIsWrongWithThem) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::v4l2_options_test

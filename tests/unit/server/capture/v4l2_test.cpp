@@ -6,7 +6,7 @@
 #include "server/capture/v4l2/v4l2_camera.hpp"
 #include "tests/unit/server/capture/v4l2_fixture.hpp"
 
-namespace saccade {
+namespace saccade::v4l2_test {
 namespace {
 
 TEST_F(V4l2, GivesGreyAndColourOfAllFourFormats) {
@@ -143,7 +143,7 @@ TEST_F(V4l2, UnpluggedCameraIsWaitedForAndGoesOn) {
   camera_->controls[V4L2_CID_FOCUS_AUTO] = {0, 1, 1};
   Start();
   const std::optional<Frame> before = Take(Shot());
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   camera_->SetPlugged(false);
   auto next = std::async(std::launch::async, [this] { return source_->Next(); });
   EXPECT_EQ(next.wait_for(std::chrono::milliseconds(500)), std::future_status::timeout);
@@ -161,7 +161,7 @@ TEST_F(V4l2, UnpluggedCameraIsWaitedForAndGoesOn) {
   EXPECT_EQ(source_->counts().unplugged, 1u);
   EXPECT_EQ(camera_->opened(), 2);
   EXPECT_EQ(camera_->Value(V4L2_CID_FOCUS_AUTO), 0);
-  (void)testing::internal::GetCapturedStderr();
+  (void)::testing::internal::GetCapturedStderr();
 }
 
 TEST_F(V4l2, CameraThatFallsSilentIsOpenedAnew) {
@@ -191,4 +191,4 @@ TEST_F(V4l2, StopEndsAWaitingReaderWithAndWithoutTheCamera) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::v4l2_test

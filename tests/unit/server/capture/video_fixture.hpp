@@ -16,7 +16,7 @@ namespace saccade {
 
 /// Real videos, made by Debian's ffmpeg: each frame shows its number, in blocks that survive any
 /// coding, before a coloured ramp.
-class VideoFixture : public testing::Test {
+class VideoFixture : public ::testing::Test {
  protected:
   static constexpr int kWidth = 320, kHeight = 240, kFrames = 240, kBits = 10;
 

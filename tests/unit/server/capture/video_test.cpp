@@ -10,7 +10,7 @@
 
 #include "tests/unit/server/capture/video_fixture.hpp"
 
-namespace saccade {
+namespace saccade::video_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -279,7 +279,7 @@ TEST(DecoderSandbox, HoldsOffFilesNetworkAndPrograms) {
         "run a program", "signal the parent", "make memory executable"}) {
     EXPECT_THAT(file, HasSubstr(std::string(what) + ": refused")) << file;
   }
-  EXPECT_THAT(file, testing::Not(HasSubstr("allowed")));
+  EXPECT_THAT(file, ::testing::Not(HasSubstr("allowed")));
   const std::string stream = Output(program + " --try-sandbox --network");
   EXPECT_THAT(stream, HasSubstr("open a socket: allowed"));
   EXPECT_THAT(stream, HasSubstr("read /etc/passwd: refused"));
@@ -287,4 +287,4 @@ TEST(DecoderSandbox, HoldsOffFilesNetworkAndPrograms) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::video_test

@@ -11,7 +11,7 @@
 #include "server/encode/i420.hpp"
 #include "tests/support/h264/h264_reader.hpp"
 
-namespace saccade {
+namespace saccade::video_encoder_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -232,4 +232,4 @@ TEST(VideoEncoder, ARealDeskAtTheDefaultBitRate) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::video_encoder_test

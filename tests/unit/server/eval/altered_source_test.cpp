@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::altered_source_test {
 namespace {
 
 /// 20 frames at 10 Hz; each picture is as bright as its number.
@@ -71,4 +71,4 @@ TEST(ParseFreeze, IsAFrameAndSeconds) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::altered_source_test

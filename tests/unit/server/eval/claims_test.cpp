@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-namespace saccade {
+namespace saccade::claims_test {
 namespace {
 
 CameraModel Camera() {
@@ -103,4 +103,4 @@ TEST_F(Claims, FileSaysMillimetresOfMetricMapsAlone) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::claims_test

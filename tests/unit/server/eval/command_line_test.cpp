@@ -17,7 +17,7 @@ struct Result {
   std::string out, err;
 };
 
-class SaccadeEval : public testing::Test {
+class SaccadeEval : public ::testing::Test {
  protected:
   void SetUp() override { std::filesystem::create_directories(folder_); }
   void TearDown() override { std::filesystem::remove_all(folder_); }

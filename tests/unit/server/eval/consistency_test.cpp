@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace saccade {
+namespace saccade::consistency_test {
 namespace {
 
 /// 50 runs of 400 steps of a filter whose errors are `factor` times what it believes.
@@ -34,4 +34,4 @@ TEST(Consistency, OverConfidenceAndTimidityAreToldApart) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::consistency_test

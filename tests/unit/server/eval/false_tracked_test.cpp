@@ -7,7 +7,7 @@
 
 #include "server/eval/scale_windows.hpp"
 
-namespace saccade {
+namespace saccade::false_tracked_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -45,10 +45,10 @@ void ScaleStart(std::vector<PosePair>& pairs, std::size_t count, double scale) {
 }
 
 TEST(FalseTracked, ARightPathHasNone) {
-  EXPECT_EQ(CountFalseTracked(Walk(30), Alignment::kSe3).frames, 0);
-  EXPECT_EQ(CountFalseTracked(Walk(30, 0.3), Alignment::kSim3).frames, 0);
-  EXPECT_LT(CountFalseTracked(Walk(30, 0.3), Alignment::kSim3).worst_m, 1e-6);
-  EXPECT_EQ(CountFalseTracked({}, Alignment::kSim3).frames, 0);
+  EXPECT_EQ(CountFalseTracked(Walk(30), TrajectoryAlignment::kSe3).frames, 0);
+  EXPECT_EQ(CountFalseTracked(Walk(30, 0.3), TrajectoryAlignment::kSim3).frames, 0);
+  EXPECT_LT(CountFalseTracked(Walk(30, 0.3), TrajectoryAlignment::kSim3).worst_m, 1e-6);
+  EXPECT_EQ(CountFalseTracked({}, TrajectoryAlignment::kSim3).frames, 0);
 }
 
 TEST(FalseTracked, NoiseOfTwoCentimetresIsNoFalseClaimNotEvenAtTheStart) {
@@ -59,20 +59,20 @@ TEST(FalseTracked, NoiseOfTwoCentimetresIsNoFalseClaimNotEvenAtTheStart) {
     for (PosePair& pair : pairs) {
       pair.estimate.translation += Vector3d(noise(rng), noise(rng), noise(rng));
     }
-    EXPECT_EQ(CountFalseTracked(pairs, Alignment::kSim3).frames, 0) << "seed " << seed;
-    EXPECT_EQ(CountFalseTracked(pairs, Alignment::kSe3).frames, 0) << "seed " << seed;
+    EXPECT_EQ(CountFalseTracked(pairs, TrajectoryAlignment::kSim3).frames, 0) << "seed " << seed;
+    EXPECT_EQ(CountFalseTracked(pairs, TrajectoryAlignment::kSe3).frames, 0) << "seed " << seed;
   }
 }
 
 TEST(FalseTracked, AWrongScaleOfAMetricMapCountsAndIsFreeWhereNoScaleIsClaimed) {
-  EXPECT_GT(CountFalseTracked(Walk(30, 0.8), Alignment::kSe3).frames, 300);
-  EXPECT_EQ(CountFalseTracked(Walk(30, 0.8), Alignment::kSim3).frames, 0);
+  EXPECT_GT(CountFalseTracked(Walk(30, 0.8), TrajectoryAlignment::kSe3).frames, 300);
+  EXPECT_EQ(CountFalseTracked(Walk(30, 0.8), TrajectoryAlignment::kSim3).frames, 0);
 }
 
 TEST(FalseTracked, AStartAtTheWrongScaleCountsButNotWhatFollows) {
   std::vector<PosePair> pairs = Walk(30);
   ScaleStart(pairs, 90, 0.4);  // 1.5 m of path in the first 3 s
-  const FalseTracked wrong = CountFalseTracked(pairs, Alignment::kSim3);
+  const FalseTracked wrong = CountFalseTracked(pairs, TrajectoryAlignment::kSim3);
   // Those nearer to the joint than 25 cm are less than 15 cm off.
   EXPECT_GT(wrong.against_whole, 60);
   EXPECT_LT(wrong.against_whole, 90);
@@ -83,7 +83,7 @@ TEST(FalseTracked, AStartAtTheWrongScaleCountsButNotWhatFollows) {
 TEST(FalseTracked, AJumpAfterAGapCountsForAsLongAsItLasts) {
   std::vector<PosePair> pairs = Walk(30);
   Shift(pairs, 300, 304, {0.5, 0.2, 0});
-  const FalseTracked wrong = CountFalseTracked(pairs, Alignment::kSim3);
+  const FalseTracked wrong = CountFalseTracked(pairs, TrajectoryAlignment::kSim3);
   EXPECT_EQ(wrong.frames, 4);
   EXPECT_EQ(wrong.against_before, 4);
   EXPECT_EQ(wrong.first_time_ns, pairs[300].time_ns);
@@ -94,7 +94,7 @@ TEST(FalseTracked, OfARunTornByAJumpTheSmallerPartCounts) {
   std::vector<PosePair> late = Walk(30), early = late;
   Shift(late, 600, 900, {0.3, 0.3, 0});  // 42 cm: a plain alignment would split it
   const auto torn = [](const std::vector<PosePair>& pairs) {
-    return CountFalseTracked(pairs, Alignment::kSe3).frames;
+    return CountFalseTracked(pairs, TrajectoryAlignment::kSe3).frames;
   };
   EXPECT_GT(torn(late), 200);  // of 300
   EXPECT_LE(torn(late), 310);
@@ -113,14 +113,14 @@ TEST(FalseTracked, WhatLeavesThePathBeforeCountsThoughTheWholeForgivesIt) {
     const Vector3d estimate = truth - Vector3d(0.13 * out, 0, 0);
     pairs.push_back({i * Timestamp{33'333'333}, {kLevel, estimate}, {kLevel, truth}});
   }
-  const FalseTracked wrong = CountFalseTracked(pairs, Alignment::kSim3);
+  const FalseTracked wrong = CountFalseTracked(pairs, TrajectoryAlignment::kSim3);
   EXPECT_GT(wrong.against_before, 30);
   EXPECT_GT(wrong.frames, wrong.against_whole + 30);  // these the whole alone would forgive
 }
 
 TEST(RunningAlignment, IsTheAlignmentOfAllItsPoints) {
   const std::vector<PosePair> pairs = Walk(4, 0.5);
-  RunningAlignment running(Alignment::kSim3);
+  RunningAlignment running(TrajectoryAlignment::kSim3);
   for (const PosePair& pair : pairs) {
     running.Add(pair.estimate.translation, pair.truth.translation);
   }
@@ -130,7 +130,7 @@ TEST(RunningAlignment, IsTheAlignmentOfAllItsPoints) {
 }
 
 TEST(RunningAlignment, AStraightPathCarriesAlongItsLineOnly) {
-  RunningAlignment running(Alignment::kSim3);
+  RunningAlignment running(TrajectoryAlignment::kSim3);
   for (int i = 0; i <= 20; ++i) running.Add({0.1 * i, 0, 0}, {0.1 * i, 0, 0});
   EXPECT_NEAR(running.Leverage({1, 0, 0}), 1.0, 1e-6);  // its middle
   EXPECT_LT(running.Leverage({2.5, 0, 0}), 3.0);
@@ -163,4 +163,4 @@ TEST(ScaleWindows, StandingStillHoldsNoScale) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::false_tracked_test

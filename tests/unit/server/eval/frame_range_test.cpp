@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::frame_range_test {
 namespace {
 
 TEST(FrameRange, EitherEndMayBeLeftOut) {
@@ -21,4 +21,4 @@ TEST(FrameRange, AnythingElseIsRefused) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::frame_range_test

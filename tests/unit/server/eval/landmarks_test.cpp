@@ -11,7 +11,7 @@
 #include "server/tracker/make_tracker.hpp"
 #include "shared/models/shapes.hpp"
 
-namespace saccade {
+namespace saccade::landmarks_test {
 namespace {
 
 class HallOfSquares : public ::testing::Test {
@@ -25,7 +25,7 @@ class HallOfSquares : public ::testing::Test {
     auto made = SquaresSource::Create(options);
     ASSERT_TRUE(made.ok()) << made.status();
     source_ = *std::move(made);
-    file_ = std::filesystem::path(testing::TempDir()) /
+    file_ = std::filesystem::path(::testing::TempDir()) /
             ("landmarks_of_hall-" + std::to_string(::getpid()) + ".toml");
     std::ofstream(file_) << source_->squares().ToToml();
   }
@@ -120,7 +120,7 @@ Behind FollowBehind(HallMotion motion, const std::string& mode, bool told, doubl
   EXPECT_TRUE(source.ok());
   LandmarkOptions landmarks;
   landmarks.mode = mode;
-  landmarks.file = std::filesystem::path(testing::TempDir()) /
+  landmarks.file = std::filesystem::path(::testing::TempDir()) /
                    ("landmarks_behind_" + std::to_string(getpid()) + ".toml");
   std::ofstream(landmarks.file) << (*source)->squares().ToToml();
   auto tracker = MakeFrameTracker((*source)->info(), TrackerOptions(), landmarks);
@@ -211,7 +211,7 @@ std::vector<PosePair> FollowFused(const LandmarkOptions& landmarks, double durat
   EXPECT_TRUE(source.ok());
   LandmarkOptions with = landmarks;
   if (with.family.empty()) {
-    with.file = std::filesystem::path(testing::TempDir()) / "landmarks_of_away.toml";
+    with.file = std::filesystem::path(::testing::TempDir()) / "landmarks_of_away.toml";
     std::ofstream(with.file) << (*source)->squares().ToToml();
   }
   auto tracker = MakeTracker((*source)->info(), TrackerOptions(), with);
@@ -248,10 +248,10 @@ TEST(FusedTracker, MapsSquaresOfUnknownPlaceAndIsMetricByTheirSide) {
   const std::vector<PosePair> pairs = FollowFused(landmarks, 5.0, mapped);
   ASSERT_GT(pairs.size(), 30u);
   EXPECT_GE(mapped, 4u);
-  const auto score = Score(pairs, Alignment::kSe3);
+  const auto score = Score(pairs, TrajectoryAlignment::kSe3);
   ASSERT_TRUE(score.ok());
   EXPECT_LT(score->ate_se3_m, 0.02);
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::landmarks_test

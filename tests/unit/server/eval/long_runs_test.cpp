@@ -5,7 +5,7 @@
 #include "server/eval/soak_scenario.hpp"
 #include "server/eval/xyz_filter.hpp"
 
-namespace saccade {
+namespace saccade::long_runs_test {
 namespace {
 
 /// Mean position NEES over a run; 3 is ideal.
@@ -139,4 +139,4 @@ TEST(PointsWalk, IsTheWorldFrameByFrame) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::long_runs_test

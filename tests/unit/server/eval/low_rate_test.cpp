@@ -12,7 +12,7 @@
 #include "server/eval/run.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::low_rate_test {
 namespace {
 
 const std::filesystem::path kData = std::filesystem::path(SACCADE_SOURCE_DIR) / "../shared/data";
@@ -59,7 +59,7 @@ Outcome Follow(const std::string& name, std::uint64_t frames, std::uint64_t ever
     return snapshot;
   };
   const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / ("low_rate_" + std::to_string(getpid()));
+      std::filesystem::path(::testing::TempDir()) / ("low_rate_" + std::to_string(getpid()));
   const auto report = RunTracker(*source, track, *truth, folder);
   std::filesystem::remove_all(folder);
   EXPECT_TRUE(report.ok()) << report.status();
@@ -112,4 +112,4 @@ TEST(LowRate, ATurningCameraIsToldThatOnlyItsOrientationIsKnown) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::low_rate_test

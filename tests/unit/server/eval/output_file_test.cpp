@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iterator>
 
-namespace saccade {
+namespace saccade::output_file_test {
 namespace {
 
 TEST(OutputFile, AFullDiskIsToldWithItsRemedy) {
@@ -41,4 +41,4 @@ TEST(OutputFile, AtomicWriteLeavesNoPartBehind) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::output_file_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::points_tracker_test {
 namespace {
 
 struct Means {
@@ -142,4 +142,4 @@ TEST(PointsTracker, FalseMatchesHardlyHurtT15) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::points_tracker_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::points_world_test {
 namespace {
 
 TEST(PointsWorld, SameSeedSameWorld) {
@@ -55,4 +55,4 @@ TEST(PointsWorld, NoiseHasTheSigmaAskedFor) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::points_world_test

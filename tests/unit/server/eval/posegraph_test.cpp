@@ -7,16 +7,16 @@
 #include <filesystem>
 #include <fstream>
 
-namespace saccade {
+namespace saccade::posegraph_test {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 const std::filesystem::path kGraphs =
     std::filesystem::path(SACCADE_SOURCE_DIR) / "../shared/data/posegraphs";
 
-class G2o : public testing::Test {
+class G2o : public ::testing::Test {
  protected:
   void SetUp() override { std::filesystem::create_directories(folder_); }
   void TearDown() override { std::filesystem::remove_all(folder_); }
@@ -106,7 +106,7 @@ TEST_F(G2o, APlaneStaysOne) {
 }
 
 /// Optima proven by SE-Sync (Rosen et al. 2019, table 1), from the raw files.
-class KnownOptimum : public testing::TestWithParam<std::pair<const char*, double>> {};
+class KnownOptimum : public ::testing::TestWithParam<std::pair<const char*, double>> {};
 
 TEST_P(KnownOptimum, IsReached) {
   const auto& [name, optimum] = GetParam();
@@ -121,11 +121,11 @@ TEST_P(KnownOptimum, IsReached) {
 }
 
 INSTANTIATE_TEST_SUITE_P(SeSync, KnownOptimum,
-                         testing::Values(std::pair{"sphere2500.g2o", 1687.0},
-                                         std::pair{"parking-garage.g2o", 1.263}),
+                         ::testing::Values(std::pair{"sphere2500.g2o", 1687.0},
+                                           std::pair{"parking-garage.g2o", 1.263}),
                          [](const auto& graph) {
                            return std::string(graph.param.first).substr(0, 6);
                          });
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::posegraph_test

@@ -7,7 +7,7 @@
 #include "server/capture/dataset.hpp"
 #include "tests/unit/server/capture/dataset_fixture.hpp"
 
-namespace saccade {
+namespace saccade::record_source_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -87,4 +87,4 @@ TEST_F(Record, EveryLensIsReadBackToTheSameNumbers) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::record_source_test

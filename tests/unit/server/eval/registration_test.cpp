@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace saccade {
+namespace saccade::registration_test {
 namespace {
 
 CameraModel Camera() {
@@ -55,4 +55,4 @@ TEST(Registration, TenCentimetresOrFiveDegreesAreLost) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::registration_test

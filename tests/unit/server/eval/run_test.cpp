@@ -9,7 +9,7 @@
 
 #include "server/eval/run_recorder.hpp"
 
-namespace saccade {
+namespace saccade::run_test {
 namespace {
 
 /// `count` empty frames at 30 Hz.
@@ -68,7 +68,7 @@ std::string Read(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-class Run : public testing::Test {
+class Run : public ::testing::Test {
  protected:
   void TearDown() override { std::filesystem::remove_all(folder_); }
   const std::filesystem::path folder_ =
@@ -160,4 +160,4 @@ TEST_F(Run, UnwritableFolderIsAnError) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::run_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace saccade {
+namespace saccade::score_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -34,7 +34,8 @@ const Rigid3 kMoved = {ExpQuaternion({0.7, -1.2, 2.0}), {5, -3, 8}};
 
 TEST(Score, RigidlyMovedCopyIsPerfect) {
   const Trajectory truth = BentPath(10);
-  const auto score = Score(Associate(Transformed(truth, kMoved, 1.0), truth), Alignment::kSe3);
+  const auto score =
+      Score(Associate(Transformed(truth, kMoved, 1.0), truth), TrajectoryAlignment::kSe3);
   ASSERT_TRUE(score.ok());
   EXPECT_EQ(score->pairs, truth.size());
   EXPECT_LT(score->ate_se3_m, 1e-12);
@@ -46,13 +47,13 @@ TEST(Score, RigidlyMovedCopyIsPerfect) {
 TEST(Score, WrongScaleIsForgivenBySim3Only) {
   const Trajectory truth = BentPath(10);
   const auto pairs = Associate(Transformed(truth, kMoved, 0.5), truth);
-  const auto score = Score(pairs, Alignment::kSim3);
+  const auto score = Score(pairs, TrajectoryAlignment::kSim3);
   ASSERT_TRUE(score.ok());
   EXPECT_NEAR(score->scale, 2.0, 1e-9);
   EXPECT_LT(score->ate_sim3_m, 1e-9);
   EXPECT_NEAR(score->ate_se3_m, 0.5 * score->ate_null_m, 1e-9);
   EXPECT_LT(*score->rpe_1s_m, 1e-9);
-  EXPECT_GT(*Score(pairs, Alignment::kSe3)->rpe_1s_m, 0.1);
+  EXPECT_GT(*Score(pairs, TrajectoryAlignment::kSe3)->rpe_1s_m, 0.1);
 }
 
 TEST(Score, NoiseComesBackAsItsRootMeanSquare) {
@@ -66,11 +67,11 @@ TEST(Score, NoiseComesBackAsItsRootMeanSquare) {
         truth[i].world_from_camera.rotation * ExpQuaternion({noise(rng), noise(rng), noise(rng)});
   }
   const double expected = 0.01 * std::sqrt(3.0), degrees = expected * 57.29578;
-  const auto position = Score(Associate(shifted, truth), Alignment::kSe3);
+  const auto position = Score(Associate(shifted, truth), TrajectoryAlignment::kSe3);
   ASSERT_TRUE(position.ok());
   EXPECT_NEAR(position->ate_se3_m, expected, 0.05 * expected);
   EXPECT_NEAR(*position->rpe_1s_m, expected * std::sqrt(2.0), 0.1 * expected);
-  const auto rotation = Score(Associate(turned, truth), Alignment::kSe3);
+  const auto rotation = Score(Associate(turned, truth), TrajectoryAlignment::kSe3);
   ASSERT_TRUE(rotation.ok());
   EXPECT_LT(rotation->ate_se3_m, 1e-9);
   EXPECT_NEAR(rotation->rotation_se3_deg, degrees, 0.05 * degrees);
@@ -81,7 +82,7 @@ TEST(Score, StandingStillScoresTheNullError) {
   const Trajectory truth = BentPath(10);
   Trajectory still = truth;
   for (StampedPose& pose : still) pose.world_from_camera = {};
-  const auto score = Score(Associate(still, truth), Alignment::kSim3);
+  const auto score = Score(Associate(still, truth), TrajectoryAlignment::kSim3);
   ASSERT_TRUE(score.ok());
   EXPECT_NEAR(score->ate_se3_m, score->ate_null_m, 1e-12);
   EXPECT_NEAR(score->ate_sim3_m, score->ate_null_m, 1e-12);
@@ -91,7 +92,7 @@ TEST(Score, MirroredPathIsNotTurnedIntoARotation) {
   const Trajectory truth = BentPath(10);
   Trajectory mirrored = truth;
   for (StampedPose& pose : mirrored) pose.world_from_camera.translation.x() *= -1;
-  const auto score = Score(Associate(mirrored, truth), Alignment::kSe3);
+  const auto score = Score(Associate(mirrored, truth), TrajectoryAlignment::kSe3);
   ASSERT_TRUE(score.ok());
   EXPECT_GT(score->ate_se3_m, 0.05);
 }
@@ -99,7 +100,7 @@ TEST(Score, MirroredPathIsNotTurnedIntoARotation) {
 TEST(Score, TooFewPairsAreRefused) {
   const Trajectory truth = BentPath(1);
   const Trajectory two(truth.begin(), truth.begin() + 2);
-  EXPECT_EQ(Score(Associate(two, truth), Alignment::kSe3).status().code(),
+  EXPECT_EQ(Score(Associate(two, truth), TrajectoryAlignment::kSe3).status().code(),
             absl::StatusCode::kFailedPrecondition);
 }
 
@@ -127,4 +128,4 @@ TEST(Associate, GapsInTheTruthAreNotBridged) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::score_test

@@ -8,7 +8,7 @@
 #include "server/eval/markers/render_score.hpp"
 #include "server/markers/marker_detector.hpp"
 
-namespace saccade {
+namespace saccade::square_render_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -110,4 +110,4 @@ TEST(Mirrored, ATagsPictureTellsThatItIs) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::square_render_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::statistics_test {
 namespace {
 
 TEST(Sample, PercentilesAreNearestRank) {
@@ -23,4 +23,4 @@ TEST(ChiSquareMeanBand, IsTheSpecificationsBandForFiftyRuns) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::statistics_test

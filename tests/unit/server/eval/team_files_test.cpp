@@ -11,17 +11,17 @@
 #include "server/eval/team/mrclam_run.hpp"
 #include "server/eval/team/wand_files.hpp"
 
-namespace saccade {
+namespace saccade::team_files_test {
 namespace {
 
 using Files = std::map<std::string, std::string>;
 
-class TeamFiles : public testing::Test {
+class TeamFiles : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) /
+    folder_ = std::filesystem::path(::testing::TempDir()) /
               ("team_files_" + std::to_string(::getpid()) + "_" +
-               testing::UnitTest::GetInstance()->current_test_info()->name());
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
   /// `files` with what `changed` says instead; an empty text leaves a file out.
@@ -94,7 +94,7 @@ TEST_F(TeamFiles, SaysWhichLineOfMrclamIsWrong) {
     Write(Robots(), changed);
     const auto data = LoadMrclam(folder_);
     ASSERT_FALSE(data.ok()) << message;
-    EXPECT_THAT(std::string(data.status().message()), testing::HasSubstr(message));
+    EXPECT_THAT(std::string(data.status().message()), ::testing::HasSubstr(message));
   }
   for (const char* set : {"team.mode=both", "team.away=3", "team.away=0:1:2", "team.away=1:2:1",
                           "team.nothing=1", "mode=joint", "team.loss=2", "team.rate_hz=x"}) {
@@ -148,9 +148,9 @@ TEST_F(TeamFiles, SaysWhichLineOfAWandsFilesIsWrong) {
     Write(Wand(), changed);
     const auto bad = LoadWand(folder_, 0.0);
     ASSERT_FALSE(bad.ok()) << message;
-    EXPECT_THAT(std::string(bad.status().message()), testing::HasSubstr(message));
+    EXPECT_THAT(std::string(bad.status().message()), ::testing::HasSubstr(message));
   }
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::team_files_test

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <random>
 
-namespace saccade {
+namespace saccade::trajectory_test {
 namespace {
 
 std::filesystem::path Write(const std::string& text) {
@@ -53,4 +53,4 @@ TEST(Trajectory, DamagedFilesAreRefusedOrReadButNeverCrash) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::trajectory_test

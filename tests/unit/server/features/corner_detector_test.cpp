@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-namespace saccade {
+namespace saccade::corner_detector_test {
 namespace {
 
 /// Bright squares of 24 px on dark, 48 px apart: corners at known places.
@@ -165,4 +165,4 @@ TEST(CornerOptions, ValidateNamesTheField) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::corner_detector_test

@@ -9,7 +9,7 @@
 #include "tests/unit/server/features/recording.hpp"
 #include "tests/unit/server/features/textured_plane.hpp"
 
-namespace saccade {
+namespace saccade::patch_test {
 namespace {
 
 class PatchTest : public ::testing::Test {
@@ -110,4 +110,4 @@ TEST_F(PatchTest, GivenTemplatesKeepTheirSizeAndShrinkUnderRoll) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::patch_test

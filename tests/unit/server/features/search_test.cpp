@@ -11,7 +11,7 @@
 #include "server/features/patch.hpp"
 #include "tests/unit/server/features/textured_plane.hpp"
 
-namespace saccade {
+namespace saccade::search_test {
 namespace {
 
 std::shared_ptr<const CameraModel> Pinhole(int width = 320, int height = 240) {
@@ -370,4 +370,4 @@ TEST(PatchSearch, BlankPictureNeverMatches) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::search_test

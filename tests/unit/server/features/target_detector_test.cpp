@@ -8,7 +8,7 @@
 #include "shared/geometry/so3.hpp"
 #include "tests/unit/server/features/recording.hpp"
 
-namespace saccade {
+namespace saccade::target_detector_test {
 namespace {
 
 double Degrees(double radians) { return radians * 180.0 / M_PI; }
@@ -243,4 +243,4 @@ TEST(PoseFit, RansacSurvivesHalfOutliersAndRefusesNoise) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::target_detector_test

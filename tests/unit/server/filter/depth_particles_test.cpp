@@ -4,7 +4,7 @@
 
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::depth_particles_test {
 namespace {
 
 constexpr double kNoise_px = 1.0;
@@ -177,4 +177,4 @@ TEST(DepthParticles, BeginsUniformAndRefusesBadOptions) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::depth_particles_test

@@ -9,7 +9,7 @@
 #include "server/filter/robust_pose.hpp"
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::filter_state_test {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -504,4 +504,4 @@ TEST(FilterState, PredictingOverADayCostsWhatASecondCosts) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::filter_state_test

@@ -6,7 +6,7 @@
 #include "server/filter/filter_state.hpp"
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::head_motion_test {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -235,4 +235,4 @@ TEST(HeadMotion, JournalCarriesCorrectionsThroughIt) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::head_motion_test

@@ -5,7 +5,7 @@
 #include "server/filter/point_model.hpp"
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::jacobian_test {
 namespace {
 
 constexpr int kStates = 1000;
@@ -131,4 +131,4 @@ TEST(TangentBasis, StaysOrthonormalWhileTheBearingMoves) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::jacobian_test

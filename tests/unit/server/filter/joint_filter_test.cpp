@@ -10,7 +10,7 @@
 #include "server/filter/robust_pose.hpp"
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::joint_filter_test {
 namespace {
 
 constexpr double kNoise_px = 0.5;
@@ -398,4 +398,4 @@ TEST(JointFilter, RobotsComeAndGo) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::joint_filter_test

@@ -10,7 +10,7 @@
 #include "server/filter/landmark_filter.hpp"
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::koller_motion_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -242,4 +242,4 @@ TEST(LandmarkFilter, InnovationsOnAConstantTwistAreSmallerThanM1s) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::koller_motion_test

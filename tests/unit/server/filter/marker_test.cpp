@@ -3,7 +3,7 @@
 
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::marker_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -122,4 +122,4 @@ TEST(Marker, ThatIsUnknownIsRefused) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::marker_test

@@ -4,7 +4,7 @@
 
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::parallax_test {
 namespace {
 
 /// Matches of one clone: a turn, parallax of `parallax_px`, and unit noise.
@@ -62,4 +62,4 @@ TEST(Parallax, FewMatchesAreNotFitted) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::parallax_test

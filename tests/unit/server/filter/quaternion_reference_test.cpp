@@ -8,7 +8,7 @@
 #include "server/filter/filter_state.hpp"
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::quaternion_reference_test {
 namespace {
 
 using Vector13d = Eigen::Matrix<double, 13, 1>;  // r, q (w x y z), v, w
@@ -158,4 +158,4 @@ TEST(QuaternionReference, ErrorStateGivesTheSamePoseT2) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::quaternion_reference_test

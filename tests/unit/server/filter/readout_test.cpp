@@ -6,7 +6,7 @@
 
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::readout_test {
 namespace {
 
 /// A camera that goes to and fro before points of nearly known range; its rows are read one by one.
@@ -95,4 +95,4 @@ TEST(ReadOut, AFrameThatWouldMoveItFarDoesNot) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::readout_test

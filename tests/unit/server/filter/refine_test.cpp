@@ -2,7 +2,7 @@
 
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::refine_test {
 namespace {
 
 /// A filter with 12 features, and what it does for some frames: the same for every copy.
@@ -164,4 +164,4 @@ TEST(Refine, WithoutAMarkNothingMoves) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::refine_test

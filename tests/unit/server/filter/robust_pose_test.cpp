@@ -4,7 +4,7 @@
 
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::robust_pose_test {
 namespace {
 
 /// Known points seen from a camera that the filter expects a little elsewhere.
@@ -99,4 +99,4 @@ TEST(RobustPose, WithoutEvidenceThePriorStands) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::robust_pose_test

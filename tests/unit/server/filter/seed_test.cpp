@@ -2,7 +2,7 @@
 
 #include "tests/unit/server/filter/random_world.hpp"
 
-namespace saccade {
+namespace saccade::seed_test {
 namespace {
 
 /// Two clones with three features, and some covariance.
@@ -94,4 +94,4 @@ TEST(Seed, GoesOnLikeAnyOther) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::seed_test

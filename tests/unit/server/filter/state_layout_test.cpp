@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::state_layout_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -47,4 +47,4 @@ TEST(StateLayout, IslandsHaveRowsOfTheirOwnUntilTheyAreJoined) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::state_layout_test

@@ -8,13 +8,13 @@
 #include "http_client.hpp"
 #include "stream_service.hpp"
 
-namespace saccade {
+namespace saccade::gateway_test {
 namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 using std::chrono::steady_clock;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 bool Eventually(const std::function<bool()>& holds, milliseconds limit = seconds(5)) {
   const auto end = steady_clock::now() + limit;
@@ -25,7 +25,7 @@ bool Eventually(const std::function<bool()>& holds, milliseconds limit = seconds
   return true;
 }
 
-class GatewayTest : public testing::Test {
+class GatewayTest : public ::testing::Test {
  protected:
   void StartWith(GatewayOptions options) {
     options.port = 0;
@@ -181,8 +181,8 @@ TEST_F(GatewayTest, MalformedRequestsGetAStatusAndNoCall) {
         std::to_string(body.size()) + "\r\n\r\n" + body);
     const auto frames = SplitFrames(client.ReadReply().body);
     ASSERT_EQ(frames.size(), 1U);
-    EXPECT_THAT(frames[0].payload,
-                testing::AnyOf(HasSubstr("grpc-status: 3\r\n"), HasSubstr("grpc-status: 12\r\n")));
+    EXPECT_THAT(frames[0].payload, ::testing::AnyOf(HasSubstr("grpc-status: 3\r\n"),
+                                                    HasSubstr("grpc-status: 12\r\n")));
   }
   HttpClient garbage(port());
   garbage.Send("\x16\x03\x01 this is not HTTP\r\n\r\n");
@@ -313,4 +313,4 @@ TEST(GatewayStart, BadOptionsAndTakenPortsAreNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::gateway_test

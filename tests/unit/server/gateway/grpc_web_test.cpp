@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace saccade {
+namespace saccade::grpc_web_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -85,4 +85,4 @@ TEST(IsMethodPath, OnlyServiceAndMethod) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::grpc_web_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::host_check_test {
 namespace {
 
 TEST(HostCheck, ForeignNamesAreRefused) {
@@ -28,4 +28,4 @@ TEST(HostCheck, OnlyOurOwnPagesMayCall) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::host_check_test

@@ -5,13 +5,13 @@
 
 #include <fstream>
 
-namespace saccade {
+namespace saccade::static_files_test {
 namespace {
 
-class StaticFilesTest : public testing::Test {
+class StaticFilesTest : public ::testing::Test {
  protected:
   StaticFilesTest() {
-    std::string name = testing::TempDir() + "saccade_web_XXXXXX";
+    std::string name = ::testing::TempDir() + "saccade_web_XXXXXX";
     root_ = mkdtemp(name.data());
   }
   ~StaticFilesTest() override { std::filesystem::remove_all(root_); }
@@ -63,4 +63,4 @@ TEST_F(StaticFilesTest, AbsentPageSaysHowToBuildIt) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::static_files_test

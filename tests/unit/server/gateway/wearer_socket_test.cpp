@@ -13,14 +13,14 @@
 #include "tests/unit/server/capture/phone_fixture.hpp"
 #include "wearer_client.hpp"
 
-namespace saccade {
+namespace saccade::wearer_socket_test {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using Down = v1::WearerDownstream;
 
-class WearerSocketTest : public testing::Test {
+class WearerSocketTest : public ::testing::Test {
  protected:
   void SetUp() override { Open(true); }
   void TearDown() override {
@@ -416,4 +416,4 @@ TEST_F(WearerSocketTest, TheGatewayStopsWithAPhoneConnected) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::wearer_socket_test

@@ -6,7 +6,7 @@
 
 #include "tests/unit/server/gaze/closed_loop.hpp"
 
-namespace saccade {
+namespace saccade::calibration_run_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -169,4 +169,4 @@ TEST(CalibrationRun, NeedsTheLease) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::calibration_run_test

@@ -4,14 +4,13 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 
 #include "server/gaze/gaze_loop.hpp"
 #include "server/mount/drivers/sim_mount.hpp"
+#include "shared/geometry/angle.hpp"
 
 namespace saccade {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Timestamp kMs = 1'000'000;
 
 /// Gaze control on a simulated head and a wearer who moves as told; poses are exact and late, as

@@ -1,7 +1,7 @@
 // T25 to T27 with perfect knowledge of the pose: what is left is control, latency and encoders.
 #include "tests/unit/server/gaze/closed_loop.hpp"
 
-namespace saccade {
+namespace saccade::closed_loop_test {
 namespace {
 
 double RmsWhileHolding(const GazeOptions& options, double seconds) {
@@ -160,4 +160,4 @@ TEST(ClosedLoop, ALongFastSaccadeIsOne) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::closed_loop_test

@@ -6,7 +6,7 @@
 #include "server/mount/drivers/crop_mount.hpp"
 #include "tests/support/pinhole.hpp"
 
-namespace saccade {
+namespace saccade::crop_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -104,4 +104,4 @@ TEST(Crop, SizesThatDoNotFitAreRefused) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::crop_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::explorer_test {
 namespace {
 
 FeatureSnapshot At(const Eigen::Vector3d& point, double sigma) {
@@ -41,4 +41,4 @@ TEST(Explorer, AnEmptyMapGivesNothing) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::explorer_test

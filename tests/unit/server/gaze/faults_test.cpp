@@ -4,7 +4,7 @@
 
 #include "tests/unit/server/gaze/closed_loop.hpp"
 
-namespace saccade {
+namespace saccade::faults_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -158,4 +158,4 @@ TEST(GazeFaults, StopStopsWithinAFewDegrees) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::faults_test

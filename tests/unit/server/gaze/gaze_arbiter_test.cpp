@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::gaze_arbiter_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -147,4 +147,4 @@ TEST_F(GazeArbiterTest, NobodySteersWithoutALease) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::gaze_arbiter_test

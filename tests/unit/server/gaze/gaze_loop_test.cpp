@@ -2,7 +2,7 @@
 
 #include "tests/unit/server/gaze/closed_loop.hpp"
 
-namespace saccade {
+namespace saccade::gaze_loop_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -168,4 +168,4 @@ TEST(GazeLoop, IdleTimeGoesToTheUncertainPartOfTheMap) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::gaze_loop_test

@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-namespace saccade {
+namespace saccade::gaze_options_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -41,4 +41,4 @@ TEST(GazeOptions, ErrorsNameFileKeyAndRemedy) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::gaze_options_test

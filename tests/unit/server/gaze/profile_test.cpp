@@ -6,7 +6,7 @@
 #include "server/gaze/axis_profile.hpp"
 #include "server/gaze/wearer_predictor.hpp"
 
-namespace saccade {
+namespace saccade::profile_test {
 namespace {
 
 TEST(AxisProfile, ReachesAnyGoalWithinItsLimitsWithoutOvershoot) {
@@ -115,4 +115,4 @@ TEST(WearerPredictor, AfterAGapItStartsAnew) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::profile_test

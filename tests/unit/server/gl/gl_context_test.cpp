@@ -8,7 +8,7 @@
 
 #include "shared/render/gl_functions.hpp"
 
-namespace saccade {
+namespace saccade::gl_context_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -62,4 +62,4 @@ TEST(GlContext, EachThreadMayHaveItsOwn) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::gl_context_test

@@ -15,7 +15,7 @@
 #include "server/store/sqlite.hpp"
 #include "tests/unit/server/identity/temporary_folder.hpp"
 
-namespace saccade {
+namespace saccade::access_book_test {
 namespace {
 
 using saccade::testing::TemporaryFolder;
@@ -291,4 +291,4 @@ TEST(Audit, WhoIsRefusedOverAndOverPushesNobodysDeedsOut) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::access_book_test

@@ -14,7 +14,7 @@
 #include "server/identity/openssl_owners.hpp"
 #include "tests/unit/server/identity/temporary_folder.hpp"
 
-namespace saccade {
+namespace saccade::certificate_test {
 namespace {
 
 using saccade::testing::TemporaryFolder;
@@ -196,4 +196,4 @@ TEST(ServerIdentity, AGivenCertificateIsCheckedBeforeItIsServed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::certificate_test

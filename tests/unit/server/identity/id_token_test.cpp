@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/identity/signed_tokens.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::id_token_test {
 namespace {
 
 using nlohmann::json;
@@ -240,4 +240,4 @@ TEST(IdTokenClaims, NamesAreCutBetweenCharacters) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::id_token_test

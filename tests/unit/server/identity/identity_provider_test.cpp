@@ -14,7 +14,7 @@
 #include "tests/unit/server/identity/issuer.hpp"
 #include "tests/unit/server/identity/signed_tokens.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::identity_provider_test {
 namespace {
 
 using nlohmann::json;
@@ -232,4 +232,4 @@ TEST_F(Provider, RefusesWhatIsNoRequest) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::identity_provider_test

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-namespace saccade {
+namespace saccade::role_table_test {
 namespace {
 
 TEST(RoleTable, EachCallHasOneRow) {
@@ -29,4 +29,4 @@ TEST(AccessRole, WordsGoBothWays) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::role_table_test

@@ -13,7 +13,7 @@
 #include "server/store/sqlite.hpp"
 #include "tests/unit/server/identity/temporary_folder.hpp"
 
-namespace saccade {
+namespace saccade::sign_in_test {
 namespace {
 
 using saccade::testing::TemporaryFolder;
@@ -255,4 +255,4 @@ TEST(SignIn, AnOlderDataBaseIsTakenOver) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::sign_in_test

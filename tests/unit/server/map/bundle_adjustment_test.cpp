@@ -6,7 +6,7 @@
 
 #include "server/map/keyframe_graph.hpp"
 
-namespace saccade {
+namespace saccade::bundle_adjustment_test {
 namespace {
 
 constexpr double kSigma_rad = 0.3 / 500.0;
@@ -358,4 +358,4 @@ TEST(KeyframeGraph, StaysSmallAndForgetsWhatItDropped) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::bundle_adjustment_test

@@ -5,14 +5,14 @@
 
 #include "tests/support/pinhole.hpp"
 
-namespace saccade {
+namespace saccade::dormant_landmarks_test {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 /// A wall 2 m in front of the origin, seen from two keyframes: 0 straight on, 1 a metre aside.
-class DormantLandmarksTest : public testing::Test {
+class DormantLandmarksTest : public ::testing::Test {
  protected:
   void Put(FeatureId id, KeyframeId keyframe, const Eigen::Vector3d& point, int matched = 20,
            std::int64_t rests_until = 0, bool seeded = false) {
@@ -147,4 +147,4 @@ TEST_F(DormantLandmarksTest, IsBoundedAndForgetsWithTheGraph) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::dormant_landmarks_test

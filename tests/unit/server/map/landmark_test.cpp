@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::landmark_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -127,4 +127,4 @@ TEST(LeastWorth, SparesKnownAndSeededOnes) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::landmark_test

@@ -9,7 +9,7 @@
 
 #include "server/filter/point_model.hpp"
 
-namespace saccade {
+namespace saccade::lens_adjustment_test {
 namespace {
 
 constexpr double kNoise_px = 0.4;
@@ -147,4 +147,4 @@ TEST(LensAdjustment, AVectorIsTheCameraItWasMadeOf) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::lens_adjustment_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace saccade {
+namespace saccade::place_graph_test {
 namespace {
 
 constexpr int kKeyframes = 101;  // the last is where the first was
@@ -88,4 +88,4 @@ TEST(PlaceGraph, ALoopThatNoDriftExplainsIsRefused) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::place_graph_test

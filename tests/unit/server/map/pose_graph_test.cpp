@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace saccade {
+namespace saccade::pose_graph_test {
 namespace {
 
 /// Poses on a helix, each tied to the next, and one turn to the next turn.
@@ -160,4 +160,4 @@ TEST(PoseGraph, RepeatsToTheBit) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::pose_graph_test

@@ -15,7 +15,7 @@
 #include "shared/geometry/so3.hpp"
 #include "tests/unit/server/features/recording.hpp"
 
-namespace saccade {
+namespace saccade::relocaliser_test {
 namespace {
 
 /// Point nearest to two rays; nothing if the rays are nearly parallel or it misses their pixels.
@@ -354,4 +354,4 @@ TEST(Relocaliser, RefusesBadInput) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::relocaliser_test

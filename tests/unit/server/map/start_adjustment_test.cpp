@@ -7,7 +7,7 @@
 #include "server/filter/point_model.hpp"
 #include "server/map/start_guess.hpp"
 
-namespace saccade {
+namespace saccade::start_adjustment_test {
 namespace {
 
 constexpr double kSigma_rad = 0.4 / 500.0;
@@ -234,4 +234,4 @@ TEST(ScaleTo, ChangesTheUnitAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::start_adjustment_test

@@ -7,7 +7,7 @@
 #include "shared/geometry/so3.hpp"
 #include "tests/unit/server/features/recording.hpp"
 
-namespace saccade {
+namespace saccade::view_corners_test {
 namespace {
 
 /// Two pictures of 100 places between 1 and 3 m away, each with a look of its own.
@@ -87,4 +87,4 @@ TEST_F(ViewCornersTest, WithoutParallaxNothingIsKnown) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::view_corners_test

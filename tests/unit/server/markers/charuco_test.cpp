@@ -8,7 +8,7 @@
 
 #include "server/markers/aruco_detector.hpp"
 
-namespace saccade {
+namespace saccade::charuco_test {
 namespace {
 
 using ::testing::AllOf;
@@ -98,4 +98,4 @@ TEST(Charuco, WhatCannotBeIsRefusedWithTheRemedy) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::charuco_test

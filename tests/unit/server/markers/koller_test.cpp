@@ -12,7 +12,7 @@
 #include "server/markers/marker_sheet.hpp"
 #include "server/markers/puddles.hpp"
 
-namespace saccade {
+namespace saccade::koller_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -168,4 +168,4 @@ TEST(KollerDetector, RefusesWhatItIsNot) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::koller_test

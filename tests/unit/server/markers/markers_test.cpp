@@ -9,7 +9,7 @@
 #include "server/markers/marker_detector.hpp"
 #include "tests/unit/server/markers/rendered_tags.hpp"
 
-namespace saccade {
+namespace saccade::markers_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -212,4 +212,4 @@ TEST(CornerFit, IsRightToATenthAndKnowsASaddle) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::markers_test

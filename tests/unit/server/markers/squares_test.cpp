@@ -12,7 +12,7 @@
 #include "server/markers/square_watch.hpp"
 #include "tests/unit/server/markers/rendered_tags.hpp"
 
-namespace saccade {
+namespace saccade::squares_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -178,7 +178,7 @@ TEST(SquareWatch, SeesOnItsOwnThreadWhatTheDetectorSees) {
 class SquareMapFile : public ::testing::Test {
  protected:
   std::filesystem::path Write(const std::string& text) {
-    const std::filesystem::path file = std::filesystem::path(testing::TempDir()) /
+    const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) /
                                        ("squares-" + std::to_string(::getpid()) + ".toml");
     std::ofstream(file) << text;
     return file;
@@ -227,4 +227,4 @@ TEST(SquareCorners, AreInTheMakersOrder) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::squares_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::encoder_ring_test {
 namespace {
 
 constexpr Timestamp kMs = 1'000'000;
@@ -48,4 +48,4 @@ TEST(EncoderRing, KeepsOrderAndForgetsTheOld) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::encoder_ring_test

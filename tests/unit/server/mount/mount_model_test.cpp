@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace saccade {
+namespace saccade::mount_model_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -158,4 +158,4 @@ TEST(MountModel, StraightUpHasNoPanOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::mount_model_test

@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-namespace saccade {
+namespace saccade::mount_options_test {
 namespace {
 
 using ::testing::AllOf;
@@ -87,4 +87,4 @@ TEST(MountOptions, ErrorsNameFileFieldAndRemedy) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::mount_options_test

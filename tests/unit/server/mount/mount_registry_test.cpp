@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-namespace saccade {
+namespace saccade::mount_registry_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -86,4 +86,4 @@ TEST(MountRegistry, TheModelOfTheFileReachesTheDriverAndItsErrorsTheUser) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::mount_registry_test

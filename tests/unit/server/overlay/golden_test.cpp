@@ -13,7 +13,7 @@
 #include "shared/marks/strokes.hpp"
 #include "tests/unit/server/anchors/synthetic_map.hpp"
 
-namespace saccade {
+namespace saccade::golden_test {
 namespace {
 
 using nlohmann::json;
@@ -306,4 +306,4 @@ TEST(OverlayGolden, StrokesEqualTheFile) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::golden_test

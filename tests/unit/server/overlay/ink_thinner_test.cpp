@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/anchors/synthetic_map.hpp"
 
-namespace saccade {
+namespace saccade::ink_thinner_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -98,4 +98,4 @@ TEST_F(Thinning, WhatIsNotANumberHurtsNobody) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::ink_thinner_test

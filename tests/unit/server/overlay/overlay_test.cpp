@@ -14,7 +14,7 @@
 #include "server/overlay/painter.hpp"
 #include "tests/unit/server/anchors/synthetic_map.hpp"
 
-namespace saccade {
+namespace saccade::overlay_test {
 namespace {
 
 using testing::LookFrom;
@@ -297,4 +297,4 @@ TEST(StatusLine, SaysStateAndWhatToDo) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::overlay_test

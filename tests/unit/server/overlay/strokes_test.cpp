@@ -5,7 +5,7 @@
 
 #include "tests/unit/server/anchors/synthetic_map.hpp"
 
-namespace saccade {
+namespace saccade::strokes_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -92,4 +92,4 @@ TEST_F(StrokesTest, LabelsHaveAllOfTheText) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::strokes_test

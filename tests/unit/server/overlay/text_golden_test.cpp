@@ -12,7 +12,7 @@
 #include "server/overlay/overlay.hpp"
 #include "tests/unit/server/anchors/synthetic_map.hpp"
 
-namespace saccade {
+namespace saccade::text_golden_test {
 namespace {
 
 // Other versions of the fonts and of FreeType draw edges otherwise; letters stay where they are.
@@ -144,4 +144,4 @@ INSTANTIATE_TEST_SUITE_P(Languages, TextGolden, ::testing::Range<std::size_t>(0,
                          [](const auto& sample) { return Samples()[sample.param].name; });
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::text_golden_test

@@ -10,7 +10,7 @@
 #include "server/overlay/text_layout.hpp"
 #include "server/overlay/text_painter.hpp"
 
-namespace saccade {
+namespace saccade::text_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -215,4 +215,4 @@ TEST(Text, WhatWasDrawnIsKeptAndThePileIsBounded) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::text_test

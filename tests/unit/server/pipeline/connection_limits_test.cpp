@@ -4,7 +4,7 @@
 
 #include "server/pipeline/busy.hpp"
 
-namespace saccade {
+namespace saccade::connection_limits_test {
 namespace {
 
 constexpr Timestamp kSecond = 1'000'000'000;
@@ -46,4 +46,4 @@ TEST(ConnectionGate, TheProxyAndThisMachineBringOthers) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::connection_limits_test

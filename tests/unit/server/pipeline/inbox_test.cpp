@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-namespace saccade {
+namespace saccade::inbox_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -71,4 +71,4 @@ TEST(Inbox, PutWaitLosesNoItem) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::inbox_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::peer_address_test {
 namespace {
 
 TEST(PeerAddress, AHouseholdIsOneCallerAndAMappedAddressIsItself) {
@@ -55,4 +55,4 @@ TEST(PeerAddress, ATokenStandsBehindBearer) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::peer_address_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::rolling_statistics_test {
 namespace {
 
 constexpr Timestamp kMs = 1'000'000;
@@ -27,4 +27,4 @@ TEST(RollingStatistics, ForgetsWhatIsOld) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::rolling_statistics_test

@@ -6,7 +6,7 @@
 #include <future>
 #include <vector>
 
-namespace saccade {
+namespace saccade::runner_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -63,4 +63,4 @@ TEST(Runner, ABusyStageRefusesWhenAskedTo) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::runner_test

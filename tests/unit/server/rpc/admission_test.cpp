@@ -7,7 +7,7 @@
 
 #include "server/pipeline/busy.hpp"
 
-namespace saccade {
+namespace saccade::admission_test {
 namespace {
 
 constexpr Timestamp kSecond = 1'000'000'000;
@@ -88,4 +88,4 @@ TEST(Admission, JoinsAreLimitedByAddressAndInAll) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::admission_test

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace saccade {
+namespace saccade::annotation_pages_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -89,4 +89,4 @@ TEST(AnnotationPages, AForeignTokenIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::annotation_pages_test

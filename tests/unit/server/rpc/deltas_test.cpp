@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/rpc/packets.hpp"
 
-namespace saccade {
+namespace saccade::deltas_test {
 namespace {
 
 using testing::MakeTracked;
@@ -146,4 +146,4 @@ TEST(AnnotationDelta, EditsGoAtOnceAndNoiseDoesNot) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::deltas_test

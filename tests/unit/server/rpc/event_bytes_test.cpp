@@ -6,7 +6,7 @@
 #include "server/rpc/packet_backlog.hpp"
 #include "tests/unit/server/rpc/packets.hpp"
 
-namespace saccade {
+namespace saccade::event_bytes_test {
 namespace {
 
 using testing::MakePacket;
@@ -142,4 +142,4 @@ TEST(PacketBacklog, WhatIsLeftIsDecodable) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::event_bytes_test

@@ -12,7 +12,7 @@
 #include "shared/wire/to_proto.hpp"
 #include "tests/unit/server/rpc/packets.hpp"
 
-namespace saccade {
+namespace saccade::parts_test {
 namespace {
 
 using testing::MakeTracked;
@@ -363,4 +363,4 @@ TEST_F(AnnotationParts, WhatDoesNotChangeCostsASubscriberNothing) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::parts_test

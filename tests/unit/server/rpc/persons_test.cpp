@@ -11,7 +11,7 @@
 #include "server/rpc/session_table.hpp"
 #include "shared/wire/from_proto.hpp"
 
-namespace saccade {
+namespace saccade::persons_test {
 namespace {
 
 const std::string kAnn(32, 'a');
@@ -91,4 +91,4 @@ TEST(Persons, ColoursKeepOffThoseOfTheFeatures) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::persons_test

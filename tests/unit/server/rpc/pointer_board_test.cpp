@@ -9,7 +9,7 @@
 #include "server/rpc/pointer_reader.hpp"
 #include "shared/scene/limits.hpp"
 
-namespace saccade {
+namespace saccade::pointer_board_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -192,4 +192,4 @@ TEST_F(Board, WhoWasTooSlowToHearOfAnEndHearsOfItStill) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::pointer_board_test

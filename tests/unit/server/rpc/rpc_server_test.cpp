@@ -21,7 +21,7 @@
 #include "saccade/v1/annotation.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 
-namespace saccade {
+namespace saccade::rpc_server_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -336,4 +336,4 @@ TEST_F(RpcServerTest, AStreamThatIsAcknowledgedGoesOn) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::rpc_server_test

@@ -10,7 +10,7 @@
 #include "server/pipeline/busy.hpp"
 #include "shared/wire/from_proto.hpp"
 
-namespace saccade {
+namespace saccade::session_table_test {
 namespace {
 
 TEST(SessionTable, IdsAreDistinctUuids) {
@@ -176,4 +176,4 @@ TEST(SessionTable, NamesAreOneLineThatTurnsNothingAbout) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::session_table_test

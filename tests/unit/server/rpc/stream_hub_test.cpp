@@ -10,7 +10,7 @@
 
 #include "tests/unit/server/rpc/packets.hpp"
 
-namespace saccade {
+namespace saccade::stream_hub_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -232,4 +232,4 @@ TEST_F(Hub, AcknowledgingFindsItsStream) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::stream_hub_test

@@ -7,7 +7,7 @@
 
 #include "tests/unit/server/rpc/packets.hpp"
 
-namespace saccade {
+namespace saccade::subscription_test {
 namespace {
 
 using testing::MakePacket;
@@ -194,4 +194,4 @@ TEST(SubscriptionOptions, BadRequestsNameTheField) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::subscription_test

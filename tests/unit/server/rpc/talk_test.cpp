@@ -6,7 +6,7 @@
 #include "server/rpc/voice_queue.hpp"
 #include "tests/unit/server/rpc/packets.hpp"
 
-namespace saccade {
+namespace saccade::talk_test {
 namespace {
 
 using testing::MakePacket;
@@ -211,4 +211,4 @@ TEST(Subscription, WhilePausedNoPictureLeavesAndThenAKeyFrameIsFirst) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::talk_test

@@ -7,7 +7,7 @@
 
 #include "tests/unit/server/rpc/packets.hpp"
 
-namespace saccade {
+namespace saccade::video_queue_test {
 namespace {
 
 using testing::MakePacket;
@@ -140,4 +140,4 @@ TEST(VideoQueue, AnyPaceIsDecodable) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::video_queue_test

@@ -9,10 +9,10 @@
 
 #include "tests/unit/server/scene/glb_builder.hpp"
 
-namespace saccade {
+namespace saccade::gltf_reader_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::string MessageOf(const std::string& bytes) {
   const absl::StatusOr<TriangleMesh> mesh = ReadGlb(bytes);
@@ -121,4 +121,4 @@ TEST(ReadGlb, EachProblemIsNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::gltf_reader_test

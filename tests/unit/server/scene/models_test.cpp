@@ -11,7 +11,7 @@
 #include "server/scene/scene_file.hpp"
 #include "shared/models/shapes.hpp"
 
-namespace saccade {
+namespace saccade::models_test {
 namespace {
 
 const std::filesystem::path kFolder = SACCADE_SOURCE_DIR "/deploy/models";
@@ -21,7 +21,7 @@ std::string Bytes(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-class ShippedModel : public testing::TestWithParam<const char*> {
+class ShippedModel : public ::testing::TestWithParam<const char*> {
  protected:
   std::shared_ptr<const SceneModel> Model() const {
     const std::string name = GetParam();
@@ -67,12 +67,12 @@ TEST_P(ShippedModel, IsPushedToTheWallAndSinksToTheFloor) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedModel,
-                         testing::Values("shelf", "desk", "pipe", "valve", "crate", "arrow",
-                                         "divider", "person"));
+                         ::testing::Values("shelf", "desk", "pipe", "valve", "crate", "arrow",
+                                           "divider", "person"));
 
 TEST(ShippedModels, AreWhatTheScriptWrites) {
-  const std::filesystem::path out =
-      std::filesystem::path(testing::TempDir()) / ("shipped_models-" + std::to_string(::getpid()));
+  const std::filesystem::path out = std::filesystem::path(::testing::TempDir()) /
+                                    ("shipped_models-" + std::to_string(::getpid()));
   const std::string command = (kFolder / "generate").string() + " " + out.string();
   ASSERT_EQ(std::system(command.c_str()), 0) << "python3 is missing? deploy/install brings it";
   int files = 0;
@@ -85,4 +85,4 @@ TEST(ShippedModels, AreWhatTheScriptWrites) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::models_test

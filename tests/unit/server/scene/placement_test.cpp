@@ -5,11 +5,11 @@
 
 #include "shared/models/shapes.hpp"
 
-namespace saccade {
+namespace saccade::placement_test {
 namespace {
 
 using Eigen::Vector3d;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr std::uint32_t kGrey = 0xb4b4b4ff;
 
@@ -120,4 +120,4 @@ TEST(CollisionScene, AThingThatHoldsAnotherInsideOverlaps) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::placement_test

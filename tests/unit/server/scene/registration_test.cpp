@@ -6,18 +6,18 @@
 #include <limits>
 #include <random>
 
-namespace saccade {
+namespace saccade::registration_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 const Similarity3 kTruth{1.0, ExpQuaternion({0.3, -1.2, 0.5}), {1.0, -2.0, 3.0}};
 
-std::vector<Correspondence> Pairs(const std::vector<Eigen::Vector3d>& points,
-                                  const Similarity3& truth, double sigma_m = 0) {
+std::vector<PointPair> Pairs(const std::vector<Eigen::Vector3d>& points, const Similarity3& truth,
+                             double sigma_m = 0) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 1);
-  std::vector<Correspondence> pairs;
+  std::vector<PointPair> pairs;
   for (const Eigen::Vector3d& point : points) {
     const Eigen::Vector3d error(noise(random), noise(random), noise(random));
     pairs.push_back({point, truth * point + sigma_m * error});
@@ -61,7 +61,7 @@ TEST(Register, TheErrorLeftOutTellsWhatARegistrationIsWorth) {
 }
 
 TEST(Register, OnePointClickedWrongStandsOut) {
-  std::vector<Correspondence> pairs = Pairs(kCorners, kTruth, 0.001);
+  std::vector<PointPair> pairs = Pairs(kCorners, kTruth, 0.001);
   pairs[4].point_in_map += Eigen::Vector3d(0.2, 0, 0);
   const auto found = Register(pairs);
   ASSERT_TRUE(found.ok());
@@ -72,7 +72,7 @@ TEST(Register, OnePointClickedWrongStandsOut) {
 }
 
 TEST(Register, DegenerateSetsAreRefused) {
-  const auto message = [](std::vector<Correspondence> pairs) {
+  const auto message = [](std::vector<PointPair> pairs) {
     const auto found = Register(pairs);
     return found.ok() ? "registered" : std::string(found.status().message());
   };
@@ -84,13 +84,13 @@ TEST(Register, DegenerateSetsAreRefused) {
               HasSubstr("without one of them"));
   EXPECT_THAT(message(Pairs({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, kTruth)),
               HasSubstr("one line"));
-  std::vector<Correspondence> nan = Pairs(kCorners, kTruth);
+  std::vector<PointPair> nan = Pairs(kCorners, kTruth);
   nan[2].point_in_map.y() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(message(nan), HasSubstr("correspondences[2]"));
-  std::vector<Correspondence> mirrored = Pairs(kCorners, kTruth, 0.002);
-  for (Correspondence& pair : mirrored) pair.point_in_model.z() *= -1;
+  std::vector<PointPair> mirrored = Pairs(kCorners, kTruth, 0.002);
+  for (PointPair& pair : mirrored) pair.point_in_model.z() *= -1;
   EXPECT_THAT(message(mirrored), HasSubstr("mirrored"));
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::registration_test

@@ -10,10 +10,10 @@
 #include "shared/models/shapes.hpp"
 #include "tests/unit/server/scene/glb_builder.hpp"
 
-namespace saccade {
+namespace saccade::scene_file_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 double Volume(const TriangleMesh& mesh) {
   double sum = 0;
@@ -43,10 +43,10 @@ TEST(Shapes, APlaneShowsItsUpperSide) {
   }
 }
 
-class SceneFile : public testing::Test {
+class SceneFile : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) /
+    folder_ = std::filesystem::path(::testing::TempDir()) /
               ("scene_file_test-" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
     std::ofstream(folder_ / "part.glb", std::ios::binary) << GlbBuilder::Triangle().Bytes();
@@ -103,4 +103,4 @@ TEST_F(SceneFile, EachProblemIsNamedWithItsPlace) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::scene_file_test

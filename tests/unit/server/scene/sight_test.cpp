@@ -10,7 +10,7 @@
 #include "server/scene/overlay_things.hpp"
 #include "shared/models/shapes.hpp"
 
-namespace saccade {
+namespace saccade::sight_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -108,4 +108,4 @@ TEST(OverlayThings, APictureHangsUpright) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::sight_test

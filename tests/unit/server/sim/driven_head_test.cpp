@@ -6,7 +6,7 @@
 #include "server/mount/drivers/sim_mount.hpp"
 #include "tests/unit/server/sim/open_sim.hpp"
 
-namespace saccade {
+namespace saccade::driven_head_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -59,4 +59,4 @@ TEST(DrivenHead, WithoutAHeadFramesCarryNoAngles) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::driven_head_test

@@ -6,7 +6,7 @@
 
 #include "tests/unit/server/sim/open_sim.hpp"
 
-namespace saccade {
+namespace saccade::real_pictures_test {
 namespace {
 
 cv::Mat Clean(const std::string& rest, FrameId frame) {
@@ -201,4 +201,4 @@ TEST(RealPictures, ATurnAtTheStartEndsBeforeTheBoard) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::real_pictures_test

@@ -8,7 +8,7 @@
 #include "server/sim/ray_caster.hpp"
 #include "server/sim/wearer.hpp"
 
-namespace saccade {
+namespace saccade::room_test {
 namespace {
 
 const RoomScene& Room() {
@@ -95,4 +95,4 @@ TEST(RayCaster, HitsWhatAWallIsMadeOf) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::room_test

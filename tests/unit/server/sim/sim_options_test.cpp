@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace saccade {
+namespace saccade::sim_options_test {
 namespace {
 
 using ::testing::AllOf;
@@ -98,4 +98,4 @@ TEST(SimOptions, BadInputIsRefusedByNameWithARemedy) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::sim_options_test

@@ -10,7 +10,7 @@
 
 #include "tests/unit/server/sim/open_sim.hpp"
 
-namespace saccade {
+namespace saccade::sim_source_test {
 namespace {
 
 /// Largest distance [px] between detected chessboard corners and where truth projects them.
@@ -190,4 +190,4 @@ TEST(SimSourceOpen, RefusesACameraFileAndUnknownKeys) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::sim_source_test

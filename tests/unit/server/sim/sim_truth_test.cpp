@@ -9,7 +9,7 @@
 
 #include "tests/unit/server/sim/open_sim.hpp"
 
-namespace saccade {
+namespace saccade::sim_truth_test {
 namespace {
 
 TEST(SimTruth, OneLinePerFrameHandedOutWithPoseHeadAndObjects) {
@@ -53,4 +53,4 @@ TEST(SimTruth, AFileThatCannotBeWrittenIsNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::sim_truth_test

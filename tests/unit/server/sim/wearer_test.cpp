@@ -8,7 +8,7 @@
 #include "server/sim/ray_caster.hpp"
 #include "server/sim/room.hpp"
 
-namespace saccade {
+namespace saccade::wearer_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -145,4 +145,4 @@ TEST(Wearer, HeadAnglesTurnAsTheMountProtocolSays) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::wearer_test

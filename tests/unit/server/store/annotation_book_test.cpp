@@ -13,7 +13,7 @@
 #include "tests/unit/server/anchors/rig.hpp"
 #include "tests/unit/server/store/store_fixture.hpp"
 
-namespace saccade {
+namespace saccade::annotation_book_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -243,4 +243,4 @@ TEST_F(BookTest, WithoutAStoreItAnswersAtOnce) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::annotation_book_test

@@ -11,7 +11,7 @@
 
 #include "tests/unit/server/store/store_fixture.hpp"
 
-namespace saccade {
+namespace saccade::annotation_store_test {
 namespace {
 
 using ::testing::SizeIs;
@@ -150,4 +150,4 @@ TEST_F(StoreTest, CommitsOneChangeQuickly) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::annotation_store_test

@@ -6,7 +6,7 @@
 #include "server/store/sqlite.hpp"
 #include "tests/unit/server/store/store_fixture.hpp"
 
-namespace saccade {
+namespace saccade::marks_store_test {
 namespace {
 
 using ::testing::SizeIs;
@@ -216,4 +216,4 @@ TEST_F(MarksStore, AFileOfVersion1IsReadAndBroughtUpToDate) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::marks_store_test

@@ -8,13 +8,13 @@
 #include <filesystem>
 #include <fstream>
 
-namespace saccade {
+namespace saccade::scene_store_test {
 namespace {
 
-class SceneStoreTest : public testing::Test {
+class SceneStoreTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) /
+    folder_ = std::filesystem::path(::testing::TempDir()) /
               ("scene_store_test_" + std::to_string(getpid()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
@@ -88,8 +88,8 @@ void FillUntilRefused(const std::filesystem::path& folder) {
       models += refused.ok() ? 1 : 0;
     }
     EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted) << refused;
-    EXPECT_THAT(std::string(refused.message()), testing::HasSubstr("scene.sqlite"));
-    EXPECT_THAT(std::string(refused.message()), testing::HasSubstr("make room"));
+    EXPECT_THAT(std::string(refused.message()), ::testing::HasSubstr("scene.sqlite"));
+    EXPECT_THAT(std::string(refused.message()), ::testing::HasSubstr("make room"));
     const auto stored = (*store)->LoadAll();
     ASSERT_TRUE(stored.ok()) << stored.status();
     EXPECT_EQ(stored->objects.size(), objects);
@@ -127,8 +127,8 @@ TEST_F(SceneStoreTest, TornOrForeignFilesAreRefusedInWords) {
     const auto opened = SceneStore::Open(folder_);
     const absl::Status status = opened.ok() ? (*opened)->LoadAll().status() : opened.status();
     EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << what << ": " << status;
-    EXPECT_THAT(std::string(status.message()), testing::HasSubstr("scene.sqlite")) << what;
-    EXPECT_THAT(std::string(status.message()), testing::HasSubstr("move")) << what;
+    EXPECT_THAT(std::string(status.message()), ::testing::HasSubstr("scene.sqlite")) << what;
+    EXPECT_THAT(std::string(status.message()), ::testing::HasSubstr("move")) << what;
     std::filesystem::copy_file(folder_ / "whole", file,
                                std::filesystem::copy_options::overwrite_existing);
   };
@@ -145,4 +145,4 @@ TEST_F(SceneStoreTest, TornOrForeignFilesAreRefusedInWords) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::scene_store_test

@@ -7,7 +7,7 @@
 
 #include "tests/unit/server/store/store_fixture.hpp"
 
-namespace saccade {
+namespace saccade::store_failures_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -180,4 +180,4 @@ TEST_F(StoreFailures, ReadOnlyDirectoryIsNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::store_failures_test

@@ -7,7 +7,7 @@
 #include "shared/io/log.hpp"
 #include "tests/unit/server/store/store_fixture.hpp"
 
-namespace saccade {
+namespace saccade::store_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -214,4 +214,4 @@ TEST_F(StoreFiles, ALogWithoutItsDataBaseIsPutAside) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::store_files_test

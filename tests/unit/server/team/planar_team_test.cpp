@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace saccade {
+namespace saccade::planar_team_test {
 namespace {
 
 PlanarVector SomeState(std::mt19937& engine) {
@@ -242,4 +242,4 @@ TEST(PlanarTeam, WhoComesAnewIsPlacedByWhatItSeesAndByWhoSeesIt) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::planar_team_test

@@ -8,13 +8,13 @@
 #include <fstream>
 #include <string>
 
-namespace saccade {
+namespace saccade::team_file_test {
 namespace {
 
-class TeamFile : public testing::Test {
+class TeamFile : public ::testing::Test {
  protected:
   absl::StatusOr<TeamDescription> Load(const std::string& text) {
-    const auto file = std::filesystem::path(testing::TempDir()) /
+    const auto file = std::filesystem::path(::testing::TempDir()) /
                       ("team_" + std::to_string(::getpid()) + ".toml");
     std::ofstream(file) << text;
     auto team = LoadTeam(file);
@@ -99,12 +99,12 @@ TEST_F(TeamFile, SaysWhatIsWrongAndWhatToDo) {
     const auto team = Load(text);
     ASSERT_FALSE(team.ok()) << text;
     EXPECT_EQ(team.status().code(), absl::StatusCode::kInvalidArgument);
-    EXPECT_THAT(std::string(team.status().message()), testing::HasSubstr(message)) << text;
-    EXPECT_THAT(std::string(team.status().message()), testing::HasSubstr(".toml: ")) << text;
+    EXPECT_THAT(std::string(team.status().message()), ::testing::HasSubstr(message)) << text;
+    EXPECT_THAT(std::string(team.status().message()), ::testing::HasSubstr(".toml: ")) << text;
   }
   EXPECT_FALSE(Load("[[robot]\n").ok());
   EXPECT_EQ(LoadTeam("/nowhere/team.toml").status().code(), absl::StatusCode::kNotFound);
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::team_file_test

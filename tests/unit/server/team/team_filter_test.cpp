@@ -9,7 +9,7 @@
 
 #include "server/team/reorder_buffer.hpp"
 
-namespace saccade {
+namespace saccade::team_filter_test {
 namespace {
 
 BlockState At(const Eigen::VectorXd& numbers) { return {std::nullopt, numbers}; }
@@ -71,7 +71,7 @@ TEST(TeamFilter, EqualsADenseKalmanFilter) {
   for (const int n : dims) {
     const Eigen::VectorXd mean = random.Matrix(n, 1);
     const Eigen::MatrixXd covariance = random.Covariance(n);
-    const auto id = filter.Add(std::string(1, static_cast<char>('a' + at)), BlockKind::kRobot,
+    const auto id = filter.Add(std::string(1, static_cast<char>('a' + at)), TeamBlockKind::kRobot,
                                At(mean), covariance);
     ASSERT_TRUE(id.ok()) << id.status();
     ids.push_back(*id);
@@ -116,9 +116,9 @@ TEST(TeamFilter, EqualsADenseKalmanFilter) {
 TEST(TeamFilter, BlocksThatShareNothingAreToTheByteAsInFiltersOfTheirOwnT35) {
   TeamFilter joint, first, second;
   const auto start = [](TeamFilter& filter, const std::string& name) {
-    const auto robot = filter.Add(name, BlockKind::kRobot, At(Eigen::VectorXd::Ones(4)),
+    const auto robot = filter.Add(name, TeamBlockKind::kRobot, At(Eigen::VectorXd::Ones(4)),
                                   Eigen::MatrixXd::Identity(4, 4));
-    const auto feature = filter.Add(name + " feature", BlockKind::kFeature,
+    const auto feature = filter.Add(name + " feature", TeamBlockKind::kFeature,
                                     At(Eigen::VectorXd::Ones(2)), Eigen::MatrixXd::Identity(2, 2));
     return std::pair(*robot, *feature);
   };
@@ -144,19 +144,19 @@ TEST(TeamFilter, BlocksThatShareNothingAreToTheByteAsInFiltersOfTheirOwnT35) {
 TEST(TeamFilter, WhatIsDerivedIsCorrelatedAndGoneAgainLeavesNoTraceT3) {
   Random random(3);
   TeamFilter filter;
-  const BlockId robot =
-      *filter.Add("robot", BlockKind::kRobot, At(Eigen::VectorXd::Zero(4)), random.Covariance(4));
-  const BlockId other =
-      *filter.Add("other", BlockKind::kRobot, At(Eigen::VectorXd::Zero(4)), random.Covariance(4));
+  const BlockId robot = *filter.Add("robot", TeamBlockKind::kRobot, At(Eigen::VectorXd::Zero(4)),
+                                    random.Covariance(4));
+  const BlockId other = *filter.Add("other", TeamBlockKind::kRobot, At(Eigen::VectorXd::Zero(4)),
+                                    random.Covariance(4));
   Live(filter, robot,
-       *filter.Add("feature", BlockKind::kFeature, At(Eigen::VectorXd::Zero(2)),
+       *filter.Add("feature", TeamBlockKind::kFeature, At(Eigen::VectorXd::Zero(2)),
                    random.Covariance(2)),
        4, 3);
   const Eigen::MatrixXd before = filter.FullCovariance();
   const Eigen::MatrixXd j = random.Matrix(2, 4), noise = random.Covariance(2);
   const std::array from = {BlockJacobian{robot, j}};
   const auto born =
-      filter.Derive("clone", BlockKind::kMapFrame, At(Eigen::VectorXd::Zero(2)), from, noise);
+      filter.Derive("clone", TeamBlockKind::kMapFrame, At(Eigen::VectorXd::Zero(2)), from, noise);
   ASSERT_TRUE(born.ok()) << born.status();
   EXPECT_LT((filter.Cross(*born, robot) - j * filter.covariance(robot)).norm(), 1e-12);
   EXPECT_LT(
@@ -171,9 +171,9 @@ TEST(TeamFilter, AStaticCameraIsPlacedByARobotAndThenHelpsIt) {
   TeamFilter filter;
   Eigen::Matrix<double, 6, 1> sigma;
   sigma << 0.02, 0.02, 0.02, 0.01, 0.01, 0.01;
-  const BlockId robot =
-      *filter.Add("robot", BlockKind::kRobot, PoseAt({0, 0, 2}), sigma.cwiseAbs2().asDiagonal());
-  const BlockId camera = *filter.Add("camera", BlockKind::kCamera, PoseAt({0.2, 0.1, -0.2}),
+  const BlockId robot = *filter.Add("robot", TeamBlockKind::kRobot, PoseAt({0, 0, 2}),
+                                    sigma.cwiseAbs2().asDiagonal());
+  const BlockId camera = *filter.Add("camera", TeamBlockKind::kCamera, PoseAt({0.2, 0.1, -0.2}),
                                      0.25 * Eigen::MatrixXd::Identity(6, 6));
   // The robot's marker, seen by a camera that is truly at the origin: both points' bearings.
   const std::array<Eigen::Vector3d, 4> corners = {
@@ -219,7 +219,7 @@ TEST(TeamFilter, AStaticCameraIsPlacedByARobotAndThenHelpsIt) {
 
 TEST(TeamFilter, AGrossErrorWeighsLittleAndAnErrorChangesNothing) {
   TeamFilter filter;
-  const BlockId robot = *filter.Add("robot", BlockKind::kRobot, At(Eigen::VectorXd::Zero(2)),
+  const BlockId robot = *filter.Add("robot", TeamBlockKind::kRobot, At(Eigen::VectorXd::Zero(2)),
                                     0.01 * Eigen::MatrixXd::Identity(2, 2));
   const std::array blocks = {robot};
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(2, 2);
@@ -237,8 +237,8 @@ TEST(TeamFilter, AGrossErrorWeighsLittleAndAnErrorChangesNothing) {
             absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(filter.Update(blocks, Linear(Eigen::Vector2d(NAN, 0), {one}), one, {}).status().code(),
             absl::StatusCode::kFailedPrecondition);
-  EXPECT_FALSE(filter.Add("robot", BlockKind::kRobot, At(Eigen::VectorXd::Zero(2)), one).ok());
-  EXPECT_FALSE(filter.Add("b", BlockKind::kRobot, At(Eigen::VectorXd::Zero(3)), one).ok());
+  EXPECT_FALSE(filter.Add("robot", TeamBlockKind::kRobot, At(Eigen::VectorXd::Zero(2)), one).ok());
+  EXPECT_FALSE(filter.Add("b", TeamBlockKind::kRobot, At(Eigen::VectorXd::Zero(3)), one).ok());
   EXPECT_FALSE(filter.Predict(99, At(Eigen::VectorXd::Zero(2)), one, one).ok());
   EXPECT_EQ(filter.covariance(robot), before);
 }
@@ -266,4 +266,4 @@ TEST(ReorderBuffer, GivesBackTheOrderOfExposureAndCountsWhatIsLateT37) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::team_filter_test

@@ -5,7 +5,7 @@
 
 #include "server/team/wand_start.hpp"
 
-namespace saccade {
+namespace saccade::wand_test {
 namespace {
 
 constexpr CornerOrder kTheirs = {2, 1, 0, 3};  // of the detector of this world
@@ -143,4 +143,4 @@ TEST(WandTeam, TheOrderOfCornersNeedsTwoTagsAtOnce) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::wand_test

@@ -4,7 +4,7 @@
 
 #include "server/tracker/picture_rate.hpp"
 
-namespace saccade {
+namespace saccade::advice_test {
 namespace {
 
 bool Contains(const std::string& text, const char* words) {
@@ -98,4 +98,4 @@ TEST(PictureRate, BelowOnePictureASecondNothingIsFollowed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::advice_test

@@ -7,7 +7,7 @@
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::cover_test {
 namespace {
 
 constexpr FrameId kCovered = 150, kUncovered = 240, kEnd = 285;  // 3 s and 1.5 s at 30 Hz
@@ -79,4 +79,4 @@ TEST(Cover, WithNothingLeftInViewThePlaceIsRecognised) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::cover_test

@@ -8,7 +8,7 @@
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::dormancy_test {
 namespace {
 
 /// A tracker too small for all that it sees, and what of it is used when the camera is back.
@@ -184,4 +184,4 @@ TEST(Dormancy, WhatWasLeftBehindTooYoungToRestLeavesTheFilter) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::dormancy_test

@@ -5,7 +5,7 @@
 
 #include <random>
 
-namespace saccade {
+namespace saccade::encoder_motion_test {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -89,4 +89,4 @@ TEST(EncoderMotion, ASaccadeThatBeginsIsFasterThanItsMean) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::encoder_motion_test

@@ -7,14 +7,14 @@
 #include "server/filter/point_model.hpp"
 #include "tests/support/pinhole.hpp"
 
-namespace saccade {
+namespace saccade::group_consistency_test {
 namespace {
 
 constexpr int kGroups = 4, kInGroup = 12;
 
 /// Points at 1 to 4 m, seen from four clones that are each turned by up to a degree from where they
 /// are thought to be, by a camera that is 3 cm and a degree from where it is thought to be.
-class GroupConsistency : public testing::Test {
+class GroupConsistency : public ::testing::Test {
  protected:
   GroupConsistency() {
     const CameraModel lens(Pinhole(640, 480, 500));
@@ -78,4 +78,4 @@ TEST_F(GroupConsistency, WhereHalfIsFalseNothingIsSaid) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::group_consistency_test

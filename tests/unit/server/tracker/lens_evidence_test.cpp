@@ -10,10 +10,10 @@
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::lens_evidence_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr char kWords[] = "The lens file does not fit: residuals grow with the radius";
 
@@ -172,4 +172,4 @@ TEST(LensWords, SayWhatAndHowMuch) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::lens_evidence_test

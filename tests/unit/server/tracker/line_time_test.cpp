@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::line_time_test {
 namespace {
 
 CameraModel Camera(int width, int height) {
@@ -37,4 +37,4 @@ TEST(LineTime, OutsideThePictureItIsThatOfTheEdge) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::line_time_test

@@ -7,7 +7,7 @@
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::live_test {
 namespace {
 
 constexpr double kSeconds = 4.0;
@@ -67,4 +67,4 @@ TEST(LiveTracker, OfflineItWaitsSoThatResultsRepeat) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::live_test

@@ -5,10 +5,10 @@
 
 #include "server/tracker/tracker_options.hpp"
 
-namespace saccade {
+namespace saccade::options_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 TEST(TrackerOptions, DefaultsAreValid) { EXPECT_TRUE(TrackerOptions().Validate().ok()); }
 
@@ -36,7 +36,7 @@ TEST(TrackerOptions, WrongKeysAndValuesAreNamedAndChangeNothing) {
 }
 
 TEST(TrackerOptions, TomlFileIsReadAndItsErrorsNameFileAndKey) {
-  const std::string path = testing::TempDir() + "/tracker_options.toml";
+  const std::string path = ::testing::TempDir() + "/tracker_options.toml";
   std::ofstream(path) << "[server]\nx = 1\n[tracker]\nseed = 9\nfej = false\ngate_sigma = 2.5\n";
   TrackerOptions options;
   ASSERT_TRUE(options.LoadToml(path).ok());
@@ -52,4 +52,4 @@ TEST(TrackerOptions, TomlFileIsReadAndItsErrorsNameFileAndKey) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::options_test

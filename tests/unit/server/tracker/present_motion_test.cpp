@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::present_motion_test {
 namespace {
 
 constexpr double kSway_s = 1.2;  // a hand's
@@ -85,4 +85,4 @@ TEST(PresentMotion, WithoutAStepItIsWhatTheFilterHolds) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::present_motion_test

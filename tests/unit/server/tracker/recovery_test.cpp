@@ -11,7 +11,7 @@
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::recovery_test {
 namespace {
 
 using Snapshot = std::shared_ptr<const MapSnapshot>;
@@ -83,7 +83,7 @@ struct Place {
   std::unique_ptr<FrameSource> (*open)();
 };
 
-class Recovery : public testing::TestWithParam<Place> {
+class Recovery : public ::testing::TestWithParam<Place> {
  protected:
   void SetUp() override {
     const std::unique_ptr<FrameSource> source = GetParam().open();
@@ -199,9 +199,9 @@ TEST_P(Recovery, ResetStartsANewMap) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Recordings, Recovery,
-                         testing::Values(Place{"TumFr1Xyz", OpenRecorded},
-                                         Place{"Simulated", OpenSimulated}),
+                         ::testing::Values(Place{"TumFr1Xyz", OpenRecorded},
+                                           Place{"Simulated", OpenSimulated}),
                          [](const auto& place) { return std::string(place.param.name); });
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::recovery_test

@@ -10,7 +10,7 @@
 #include "server/tracker/suspension.hpp"
 #include "tests/unit/server/tracker/mapped_view.hpp"
 
-namespace saccade {
+namespace saccade::rules_test {
 namespace {
 
 using testing::MappedView;
@@ -184,4 +184,4 @@ TEST(SamePicture, IsOneToTheBit) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::rules_test

@@ -10,7 +10,7 @@
 #include "server/tracker/marker_fit.hpp"
 #include "server/tracker/square_doubts.hpp"
 
-namespace saccade {
+namespace saccade::squares_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -204,7 +204,7 @@ TEST(LandmarkOptions, AreReadAndRefused) {
   EXPECT_TRUE(options.Set("mode", "koller").ok());
   EXPECT_THAT(std::string(options.Validate().message()), HasSubstr("landmarks.file"));
 
-  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) /
+  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) /
                                      ("squares-config-" + std::to_string(::getpid()) + ".toml");
   std::ofstream(file) << "[landmarks]\nmode = \"koller\"\nfile = \"squares.toml\"\n";
   LandmarkOptions read;
@@ -216,4 +216,4 @@ TEST(LandmarkOptions, AreReadAndRefused) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::squares_test

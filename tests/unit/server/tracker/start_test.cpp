@@ -8,12 +8,12 @@
 #include "server/capture/dataset.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::start_test {
 namespace {
 
 using Snapshot = std::shared_ptr<const MapSnapshot>;
 
-class StartOfRecording : public testing::Test {
+class StartOfRecording : public ::testing::Test {
  protected:
   void SetUp() override {
     const std::filesystem::path folder =
@@ -157,4 +157,4 @@ TEST_F(StartOfRecording, TwoRunsAreTheSame) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::start_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::status_monitor_test {
 namespace {
 
 StatusMonitor Tracking() {
@@ -76,4 +76,4 @@ TEST(StatusMonitor, RelocalisationIsConfirmedByTheNextFramesOrRefused) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::status_monitor_test

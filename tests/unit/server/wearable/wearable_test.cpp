@@ -7,7 +7,7 @@
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
-namespace saccade {
+namespace saccade::wearable_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -101,4 +101,4 @@ TEST_F(WearableTest, ReadersStillGetAnAnswerAfterTheEnd) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::wearable_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace saccade {
+namespace saccade::echo_canceller_test {
 namespace {
 
 double Power(const VoiceFrame& frame) {
@@ -47,4 +47,4 @@ TEST(EchoCanceller, TakesOutWhatTheLoudspeakerSays) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::echo_canceller_test

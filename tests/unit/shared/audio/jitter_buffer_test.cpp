@@ -5,7 +5,7 @@
 #include <map>
 #include <random>
 
-namespace saccade {
+namespace saccade::jitter_buffer_test {
 namespace {
 
 constexpr Timestamp kMs = 1'000'000;
@@ -110,4 +110,4 @@ TEST(JitterBuffer, ItIsBoundedWhateverIsSent) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::jitter_buffer_test

@@ -5,7 +5,7 @@
 
 #include "tests/unit/shared/audio/tones.hpp"
 
-namespace saccade {
+namespace saccade::opus_voice_test {
 namespace {
 
 using testing::AmplitudeOf;
@@ -64,4 +64,4 @@ TEST(OpusVoice, WhatIsMissingGoesOnForAMomentAndFades) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::opus_voice_test

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::pcm_device_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -31,4 +31,4 @@ TEST(PcmDevice, TwentyMillisecondsAtATime) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::pcm_device_test

@@ -5,7 +5,7 @@
 
 #include "tests/unit/shared/audio/tones.hpp"
 
-namespace saccade {
+namespace saccade::voice_mixer_test {
 namespace {
 
 using testing::AmplitudeOf;
@@ -82,4 +82,4 @@ TEST(VoiceMixer, ThoseWhoCannotAllBeHeardAreBounded) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::voice_mixer_test

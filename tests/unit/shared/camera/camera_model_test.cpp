@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-namespace saccade {
+namespace saccade::camera_model_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -45,11 +45,11 @@ const Case kCases[] = {
     {"fov_nearly_pinhole", LensModel::kFov, {1e-3}},
 };
 
-class EveryLens : public testing::TestWithParam<Case> {
+class EveryLens : public ::testing::TestWithParam<Case> {
  protected:
   CameraModel camera_ = Camera(GetParam().model, GetParam().distortion);
 };
-INSTANTIATE_TEST_SUITE_P(Models, EveryLens, testing::ValuesIn(kCases),
+INSTANTIATE_TEST_SUITE_P(Models, EveryLens, ::testing::ValuesIn(kCases),
                          [](const auto& each) { return each.param.name; });
 
 // T1: relative to the largest entry of the Jacobian.
@@ -212,4 +212,4 @@ TEST(CameraModel, EveryRecordingsCameraRoundTrips) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::camera_model_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::rigid3_test {
 namespace {
 
 const Rigid3 kA = {ExpQuaternion({0.3, -0.2, 1.1}), {1, 2, 3}};
@@ -30,4 +30,4 @@ TEST(Rigid3, RotationAngleIsSymmetricAndIgnoresTranslation) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::rigid3_test

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-namespace saccade {
+namespace saccade::so3_test {
 namespace {
 
 using Eigen::Matrix3d;
@@ -85,4 +85,4 @@ TEST(So3, RightJacobianIsSmoothWhereItsSeriesBegins) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::so3_test

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-namespace saccade {
+namespace saccade::log_test {
 namespace {
 
 using ::testing::EndsWith;
@@ -128,4 +128,4 @@ TEST(Printable, LeavesNothingThatAReaderCouldMistake) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::log_test

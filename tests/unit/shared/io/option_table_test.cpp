@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-namespace saccade {
+namespace saccade::option_table_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -80,4 +80,4 @@ TEST(OptionTable, WhatDescribesItIsAFileThatChangesNothing) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::option_table_test

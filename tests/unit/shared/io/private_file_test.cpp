@@ -12,7 +12,7 @@
 
 #include "shared/io/qr_code.hpp"
 
-namespace saccade {
+namespace saccade::private_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -64,4 +64,4 @@ TEST(QrCode, HasItsFindersAndNoneForWhatIsTooLong) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::private_file_test

@@ -9,7 +9,7 @@
 #include <chrono>
 #include <fstream>
 
-namespace saccade {
+namespace saccade::regular_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -89,4 +89,4 @@ TEST_F(RegularFile, RunningOutOfDescriptorsIsNoFaultOfTheFile) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::regular_file_test

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-namespace saccade {
+namespace saccade::toml_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -69,4 +69,4 @@ TEST(TomlFile, AFolderAndALongFileAreNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::toml_file_test

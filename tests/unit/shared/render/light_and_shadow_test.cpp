@@ -8,7 +8,7 @@
 #include "shared/render/framebuffer.hpp"
 #include "shared/render/scene_painter.hpp"
 
-namespace saccade {
+namespace saccade::light_and_shadow_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -166,4 +166,4 @@ TEST_F(PaintedBox, IsLitAsIsKnownAndElseAsBefore) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::light_and_shadow_test

@@ -13,7 +13,7 @@
 #include "shared/render/program.hpp"
 #include "shared/render/texture.hpp"
 
-namespace saccade {
+namespace saccade::render_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -135,4 +135,4 @@ TEST_F(RenderTest, AMissingFunctionIsNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::render_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace saccade {
+namespace saccade::from_proto_test {
 namespace {
 
 using ::testing::StartsWith;
@@ -172,4 +172,4 @@ TEST(DraftFromProto, SurvivesMutatedRequests) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::from_proto_test

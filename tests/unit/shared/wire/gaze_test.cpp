@@ -5,7 +5,7 @@
 
 #include <limits>
 
-namespace saccade::wire {
+namespace saccade::wire::gaze_test {
 namespace {
 
 using ::testing::StartsWith;
@@ -109,4 +109,4 @@ TEST(WireGaze, ACalibrationComesBackAsItWas) {
 }
 
 }  // namespace
-}  // namespace saccade::wire
+}  // namespace saccade::wire::gaze_test

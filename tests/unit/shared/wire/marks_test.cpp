@@ -9,7 +9,7 @@
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/to_proto.hpp"
 
-namespace saccade {
+namespace saccade::marks_test {
 namespace {
 
 using ::testing::StartsWith;
@@ -209,4 +209,4 @@ TEST(Marks, GoOverTheWireAndBack) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::marks_test

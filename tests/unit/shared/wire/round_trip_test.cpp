@@ -6,7 +6,7 @@
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/to_proto.hpp"
 
-namespace saccade {
+namespace saccade::round_trip_test {
 namespace {
 
 MapSnapshot MakeSnapshot() {
@@ -133,4 +133,4 @@ TEST(StateFromProto, BadStateIsNamed) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::round_trip_test

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-namespace saccade {
+namespace saccade::occlusion_test {
 namespace {
 
 TEST(Occlusion, WhatIsSeenAndWhatIsHiddenIsThatOfCastRays) {
-  const std::filesystem::path out = std::filesystem::path(testing::TempDir()) / "occlusion_test";
+  const std::filesystem::path out = std::filesystem::path(::testing::TempDir()) / "occlusion_test";
   const absl::StatusOr<OcclusionSummary> summary = RunOcclusion(5, 12, out);
   ASSERT_TRUE(summary.ok()) << summary.status();
   EXPECT_GE(summary->partly_hidden, 4);
@@ -17,4 +17,4 @@ TEST(Occlusion, WhatIsSeenAndWhatIsHiddenIsThatOfCastRays) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::occlusion_test

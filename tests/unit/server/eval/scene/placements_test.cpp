@@ -5,7 +5,7 @@
 #include "server/eval/scene/placement_judge.hpp"
 #include "shared/models/shapes.hpp"
 
-namespace saccade {
+namespace saccade::placements_test {
 namespace {
 
 using Triangle = PlacementJudge::Triangle;
@@ -58,4 +58,4 @@ TEST(Placements, RestWithinAMillimetreByAnIndependentJudge) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::placements_test

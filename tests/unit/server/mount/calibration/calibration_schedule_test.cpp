@@ -6,7 +6,7 @@
 
 #include "server/mount/fixed_joint.hpp"
 
-namespace saccade {
+namespace saccade::calibration_schedule_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -39,4 +39,4 @@ TEST(CalibrationSchedule, StaysWithinLimitsAndRateAndEndsAtRest) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::calibration_schedule_test

@@ -12,7 +12,7 @@
 #include "server/mount/mount_model.hpp"
 #include "server/mount/mount_options.hpp"
 
-namespace saccade {
+namespace saccade::mount_calibration_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -284,4 +284,4 @@ TEST(MountToml, IsReadBackAsItWas) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::mount_calibration_test

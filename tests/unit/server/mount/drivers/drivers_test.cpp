@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-namespace saccade {
+namespace saccade::drivers_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -73,4 +73,4 @@ TEST(MountDrivers, WhatDescribesTheTablesIsAFileThatChangesNothing) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::drivers_test

@@ -12,7 +12,7 @@
 
 #include "tests/unit/server/mount/drivers/dynamixel_emulator.hpp"
 
-namespace saccade {
+namespace saccade::dynamixel_mount_test {
 namespace {
 
 using ::testing::AllOf;
@@ -364,4 +364,4 @@ TEST(DynamixelOptions, ErrorsNameFileFieldAndRemedy) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::dynamixel_mount_test

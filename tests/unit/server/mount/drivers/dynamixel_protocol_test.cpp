@@ -5,7 +5,7 @@
 
 #include <random>
 
-namespace saccade::dynamixel {
+namespace saccade::dynamixel::dynamixel_protocol_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -135,4 +135,4 @@ TEST(DynamixelProtocol, NumbersAreSignedAndLittleEndian) {
 }
 
 }  // namespace
-}  // namespace saccade::dynamixel
+}  // namespace saccade::dynamixel::dynamixel_protocol_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace saccade {
+namespace saccade::sim_mount_test {
 namespace {
 
 constexpr Timestamp kMs = 1'000'000;
@@ -144,4 +144,4 @@ TEST(SimMount, AStuckAxisIsReportedByNameAndTheOthersMove) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::sim_mount_test

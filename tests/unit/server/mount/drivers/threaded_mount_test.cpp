@@ -7,7 +7,7 @@
 #include <functional>
 #include <thread>
 
-namespace saccade {
+namespace saccade::threaded_mount_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -104,4 +104,4 @@ TEST(ThreadedMount, RefusesWhatIsNotFinite) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::threaded_mount_test

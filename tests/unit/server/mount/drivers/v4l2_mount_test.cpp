@@ -12,7 +12,7 @@
 
 #include "server/mount/fixed_joint.hpp"
 
-namespace saccade {
+namespace saccade::v4l2_mount_test {
 namespace {
 
 using ::testing::AllOf;
@@ -279,4 +279,4 @@ TEST(V4l2Mount, AMissingCameraIsAnErrorThatNamesIt) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::v4l2_mount_test
