@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-json ToJson(const VideoMode& mode) {
+json ModeJson(const VideoMode& mode) {
   json out = {{"format", FormatName(mode.fourcc)},
               {"width", mode.width},
               {"height", mode.height},
@@ -59,7 +59,7 @@ json CamerasJson(const std::vector<ListedVideoDevice>& devices) {
     } else {
       camera.update({{"name", facts.name}, {"driver", facts.driver}, {"bus", facts.bus}});
       camera["modes"] = json::array();
-      for (const VideoMode& mode : facts.modes) camera["modes"].push_back(ToJson(mode));
+      for (const VideoMode& mode : facts.modes) camera["modes"].push_back(ModeJson(mode));
     }
     list.push_back(std::move(camera));
   }

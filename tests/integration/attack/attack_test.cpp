@@ -8,7 +8,7 @@
 
 #include "saccade/v1/session.pb.h"
 
-namespace saccade::testing::attack_test {
+namespace saccade::testing {
 
 void AttackTest::Begin(const TargetOptions& options) {
   // Our own peers are many; never more than these.
@@ -81,4 +81,4 @@ bool AttackTest::WaitForParticipants(int count, milliseconds limit) {
   return true;
 }
 
-}  // namespace saccade::testing::attack_test
+}  // namespace saccade::testing

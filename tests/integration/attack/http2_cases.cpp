@@ -12,7 +12,7 @@ enum Type : unsigned char {
   kReset,
   kSettings,
   kPush,
-  kPing,
+  kPingFrame,
   kGoAway,
   kWindow,
   kContinuation
@@ -79,7 +79,8 @@ std::vector<Http2Case> Http2Cases() {
       {"settings with a header table of 2^32 - 1",
        std::string(kPreface) + Frame(kSettings, 0, 0, Number(1, 2) + Number(~0u, 4))},
       {"20000 settings", begin + Repeat(20'000, [](auto) { return Frame(kSettings, 0, 0, ""); })},
-      {"5000 pings", begin + Repeat(5000, [](auto) { return Frame(kPing, 0, 0, "abcdefgh"); })},
+      {"5000 pings",
+       begin + Repeat(5000, [](auto) { return Frame(kPingFrame, 0, 0, "abcdefgh"); })},
       {"headers on stream 0", begin + Frame(kHeaders, 5, 0, headers)},
       {"headers that are no HPACK", begin + Frame(kHeaders, 5, 1, std::string(400, '\xff'))},
       {"headers without a path", begin + Frame(kHeaders, 5, 1, Field(":method", "POST"))},
