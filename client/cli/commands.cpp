@@ -11,6 +11,7 @@
 #include <iostream>
 
 #include "client/cli/access_commands.hpp"
+#include "client/cli/map_commands.hpp"
 #include "client/cli/scene_commands.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
@@ -224,6 +225,11 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kMessages:
     case Command::kPausePicture:
       return RunTalk(options);
+    case Command::kMapsList:
+    case Command::kMapsSave:
+    case Command::kMapsLoad:
+    case Command::kMapsDelete:
+      return RunMaps(options, connection);
     case Command::kSceneList:
     case Command::kSceneAdd:
     case Command::kScenePlace:

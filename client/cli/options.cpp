@@ -10,6 +10,7 @@
 
 #include "client/cli/access_commands.hpp"
 #include "client/cli/annotate_options.hpp"
+#include "client/cli/map_commands.hpp"
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/record_command.hpp"
@@ -100,6 +101,10 @@ Command CommandOf(const CLI::App& app) {
       {"say", Command::kSay},
       {"messages", Command::kMessages},
       {"pause-picture", Command::kPausePicture},
+      {"maps list", Command::kMapsList},
+      {"maps save", Command::kMapsSave},
+      {"maps load", Command::kMapsLoad},
+      {"maps delete", Command::kMapsDelete},
       {"scene list", Command::kSceneList},
       {"scene add", Command::kSceneAdd},
       {"scene place", Command::kScenePlace},
@@ -110,8 +115,9 @@ Command CommandOf(const CLI::App& app) {
       {"calibrate-camera", Command::kCalibrateCamera},
       {"print", Command::kPrintMarkers}};
   const CLI::App* chosen = app.get_subcommands().front();
-  if (chosen->get_name() == "scene") {  // its commands are called as others are
-    return commands.at(absl::StrCat("scene ", chosen->get_subcommands().front()->get_name()));
+  const std::string& family = chosen->get_name();
+  if (family == "scene" || family == "maps") {  // their commands are called as others are
+    return commands.at(absl::StrCat(family, " ", chosen->get_subcommands().front()->get_name()));
   }
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   return commands.at(chosen->get_name());
@@ -174,6 +180,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddCalibrateMount(app, options);
   AddAccess(app, options);
   AddTalk(app, options);
+  AddMaps(app, options);
   AddScene(app, options);
   AddMachine(app, options);
 

@@ -48,6 +48,10 @@ enum class Command {
   kSay,
   kMessages,
   kPausePicture,
+  kMapsList,
+  kMapsSave,
+  kMapsLoad,
+  kMapsDelete,
   kSceneList,
   kSceneAdd,
   kScenePlace,
@@ -101,6 +105,7 @@ struct Options {
   struct Markers {
     std::string family, ids, size, paper;  // print; as typed
   } markers;
+  std::string map_name;
   struct Scene {
     std::string model, shape, material, name, points;  // as typed
     std::string size, at, push, gravity;               // X,Y,Z; empty: not given

@@ -84,6 +84,12 @@ class Connection {
   absl::StatusOr<MapExport> ExportMap();
   /// Returns the new map generation.
   absl::StatusOr<std::uint64_t> ResetMap();
+  /// Maps on the server's disk, newest first.
+  absl::StatusOr<std::vector<StoredMapFacts>> ListMaps();
+  /// The id of a copy of the map as it is now.
+  absl::StatusOr<std::string> SaveMap(const std::string& name);
+  absl::Status LoadMap(const std::string& id);
+  absl::Status DeleteMap(const std::string& id);
 
   /// `draft.request_id` is filled in if empty, so that a call made again creates nothing twice.
   /// `edit_group`: edits of one session with the same one, not empty, are undone together.

@@ -74,6 +74,14 @@ struct MapState {
 };
 
 /// A file of the map, ready to be written.
+struct StoredMapFacts {
+  std::string id, name, world;  // no name: kept by the server itself
+  std::int64_t saved_unix_s = 0;
+  bool metric = false;
+  std::uint32_t landmarks = 0, places = 0, width = 0, height = 0;
+  std::uint64_t bytes = 0;
+};
+
 struct MapExport {
   std::string data;
   std::uint32_t feature_count = 0;

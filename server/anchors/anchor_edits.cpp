@@ -76,7 +76,8 @@ absl::StatusOr<ResolvedTarget> AnchorManager::Hang(const AnnotationTarget& targe
   place.id = next_content_++;
   place.map_generation = snapshot.map_generation;
   place.attached = true;
-  place.world_key = snapshot.metric ? options_.world_key : "";
+  const bool by_target = snapshot.metric && !options_.world_key.empty();
+  place.world_key = by_target ? options_.world_key : options_.map_key;
   place.method = resolved->method;
   place.point = place.clicked_point = resolved->point_in_world;
   place.clicked_covariance = resolved->covariance_in_world;

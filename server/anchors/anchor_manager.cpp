@@ -62,12 +62,15 @@ void AnchorManager::Load(std::vector<StoredAnnotation> stored, std::uint32_t las
   Publish();
 }
 
-/// A place from another run or an earlier map: found again where the same target gave the world.
+/// A place from another run or an earlier map: found again where the same target gave the world, or
+/// where it is the same map.
 bool AnchorManager::Attach(const Anchor& last, AnchorPlace& place) const {
   const MapSnapshot& snapshot = newest_->snapshot();
-  const bool same_world = !place.world_key.empty() && place.world_key == options_.world_key;
-  if (!same_world || !snapshot.metric || snapshot.status != TrackingStatus::kTracking ||
-      !last.point_in_world.allFinite() || !last.covariance_in_world.allFinite()) {
+  const bool by_target = snapshot.metric && place.world_key == options_.world_key;
+  const bool by_map = place.world_key == options_.map_key;
+  if (place.world_key.empty() || !(by_target || by_map) ||
+      snapshot.status != TrackingStatus::kTracking || !last.point_in_world.allFinite() ||
+      !last.covariance_in_world.allFinite()) {
     return false;
   }
   AnchorPlace fresh;

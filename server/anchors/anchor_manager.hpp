@@ -84,6 +84,9 @@ class AnchorManager {
   absl::StatusOr<AnnotationEdit> Undo(const Editor& editor);
   absl::StatusOr<AnnotationEdit> Redo(const Editor& editor);
 
+  /// See AnnotationBook::SetWorld.
+  void SetWorld(std::string world) { options_.map_key = std::move(world); }
+
   /// Once per frame: recomputes every anchor from the newest map and publishes. Returns the jumps.
   std::vector<AnchorMoved> Resolve(std::shared_ptr<const MapSnapshot> snapshot,
                                    const CameraModel& camera);

@@ -49,6 +49,8 @@ struct AnchorOptions {
   /// What makes world the same world after a restart: WorldKey(target). Empty: nothing does, and
   /// stored annotations stay paused.
   std::string world_key;
+  /// Of the map itself: it names its coordinates where no target does.
+  std::string map_key;
 
   absl::Status Validate() const;
 };

@@ -187,9 +187,10 @@ Anchor DescribeDetached(const MapSnapshot& snapshot, const AnchorOptions& option
   last.error_px.reset();
   last.pixel.reset();
   const std::string unknown = "its place is not known in this map";
-  if (place.world_key.empty() || place.world_key != options.world_key) {
+  const bool by_map = place.world_key == options.map_key;
+  if (place.world_key.empty() || (!by_map && place.world_key != options.world_key)) {
     last.reason = unknown + ": it belongs to another one; delete it, or place it again";
-  } else if (!snapshot.metric) {
+  } else if (!by_map && !snapshot.metric) {
     last.reason = unknown + " yet: show the target";
   } else {
     const std::string trouble = TrackerTrouble(snapshot.status);

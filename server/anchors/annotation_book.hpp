@@ -49,6 +49,10 @@ class AnnotationBook {
   std::vector<AnchorMoved> OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
                                       const CameraModel& camera);
 
+  /// Whose coordinates the map has from the next snapshot on (UUID): what was placed in it, in this
+  /// run or another, is where it was.
+  void SetWorld(std::string world) { anchors_.SetWorld(std::move(world)); }
+
   /// Follows the store: forgets what is on disk; after a failed commit takes memory back to it and
   /// answers those whose edits were lost. Every other call begins with it.
   void Settle();

@@ -96,6 +96,7 @@ absl::StatusOr<std::unique_ptr<Engine>> Engine::Create(EngineOptions options,
       [self = engine.get()] { self->inbox_.PutNewestIfEmpty({}); });
   if (!wearable.ok()) return wearable.status();
   engine->wearable_ = *std::move(wearable);
+  if (engine->options_.maps) engine->options_.maps->Connect(*engine);
   return engine;
 }
 
@@ -124,6 +125,10 @@ void Engine::Stop() {
   }
   for (std::jthread* thread : {&source_thread_, &tracker_thread_, &clock_thread_}) {
     if (thread->joinable()) thread->join();
+  }
+  if (options_.maps) {
+    options_.maps->Stop();
+    if (const auto stored = wearable_->Store(); stored.ok()) options_.maps->KeepLast(*stored);
   }
   stills_.Stop();
   gallery_.Stop();
@@ -262,6 +267,7 @@ void Engine::RunClock(std::stop_token stop) {
     if (stop.stop_requested()) return;
     sink_.OnStatistics(Statistics());
     for (const auto& view : views_) view->Tick();
+    if (options_.maps) options_.maps->Tick();
     if (++seconds % kTrimEveryS == 0) GiveBackFreedMemory();
     if (seconds % kCodeEveryS == 0 || std::has_single_bit(static_cast<unsigned>(seconds))) {
       GiveBackUnusedCode();

@@ -12,6 +12,7 @@
 
 #include "server/app/frame_clock.hpp"
 #include "server/app/gaze_runner.hpp"
+#include "server/app/map_keeper.hpp"
 #include "server/app/picture_gallery.hpp"
 #include "server/app/picture_switch.hpp"
 #include "server/app/scene_keeper.hpp"
@@ -42,6 +43,7 @@ struct EngineOptions {
   GazeOptions gaze;
   std::shared_ptr<PictureSwitch> pictures;       // null: one that keeps nothing
   std::shared_ptr<SceneKeeper> scene;            // likewise
+  std::shared_ptr<MapKeeper> maps;               // null: maps end with the run
   std::shared_ptr<CalibrationDesk> calibration;  // null: nobody calibrates the camera
   GlBackend gl = GlBackend::kOsmesa;
 };
@@ -89,6 +91,9 @@ class Engine : public Backend {
   std::shared_ptr<const Scene> scene() const override;
   SceneLight light() const override { return scene_layer_.light(); }
   absl::Status SubmitScene(SceneCommand command) override;
+  KeptMaps* maps() override { return options_.maps.get(); }
+  /// Before Start(): the first frames are looked at for it. Errors as FrameTracker::Resume.
+  absl::Status Resume(const StoredWorld& stored) { return wearable_->Resume(stored); }
 
  private:
   // What the tracker thread waits for: a frame, the end of the source, or (neither) a second

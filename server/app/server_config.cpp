@@ -34,7 +34,7 @@ struct Raw {
   std::string config, source, mount = "none", data_dir, camera, grpc = "127.0.0.1:50051",
                               http = "127.0.0.1:8080", gl = "osmesa", speed = "realtime", sim_truth,
                               web_root, public_url, trusted_proxy, tls_certificate, tls_key,
-                              client_ca, audio_in, audio_out;
+                              client_ca, audio_in, audio_out, map = "last";
   std::map<std::string, AccessRole> client_roles;
   bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
   bool overlay_dots = false, overlay_axes = false, overlay_status = false;
@@ -84,6 +84,10 @@ const std::vector<Setting>& Settings() {
        "PEM file: a client's certificate by it is an identity, its role in [client_roles]"},
       {"tls.required", nullptr, &Raw::tls_required, "TLS on loopback, too"},
       {"auth.required", nullptr, &Raw::auth_required, "invites on loopback, too"},
+      {"map", "--map", &Raw::map,
+       "what was mapped before: last: looked for first | new: kept, not looked for | ID of one "
+       "(saccade "
+       "maps list) | none: neither"},
       {"audio.in", "--audio-in", &Raw::audio_in,
        "microphone of a wearable without a browser, by ALSA's name: default, plughw:1,0"},
       {"audio.out", "--audio-out", &Raw::audio_out, "its loudspeaker, likewise"},
@@ -352,6 +356,7 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   }
   config.web_root = raw.web_root;
   if (raw.seed < 0) return Bad(absl::StrCat("seed: ", raw.seed, ": give a whole number from 0"));
+  config.map = raw.map;
   config.audio_in = raw.audio_in;
   config.audio_out = raw.audio_out;
   config.overlay_dots = raw.overlay_dots;

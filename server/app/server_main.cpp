@@ -12,6 +12,7 @@
 #include "server/app/apply_limits.hpp"
 #include "server/app/engine.hpp"
 #include "server/app/front_door.hpp"
+#include "server/app/map_keeper.hpp"
 #include "server/app/memory.hpp"
 #include "server/app/open_source.hpp"
 #include "server/app/server_config.hpp"
@@ -61,6 +62,23 @@ absl::Status CheckVideo(const ServerConfig& config, const OpenedSource& opened) 
 /// Without the password that an address may hold.
 std::string NameForReports(const std::string& source) {
   return source.find('@') == std::string::npos ? source : source.substr(0, source.find(':'));
+}
+
+/// The last map, or the one asked for. That the last one cannot be used is no reason not to start.
+absl::Status ResumeFirst(const ServerConfig& config, MapKeeper& maps, Engine& engine) {
+  const bool asked = config.map != "last";
+  const auto stored = maps.ReadFirst(asked ? config.map : "");
+  absl::Status status = stored.status();
+  if (status.ok() && stored->has_value()) status = engine.Resume(**stored);
+  if (status.ok()) {
+    if (stored->has_value()) Log(absl::StrCat("map ", (*stored)->world, " is looked for"));
+    return status;
+  }
+  if (asked) {
+    return absl::Status(status.code(), absl::StrCat("--map ", config.map, ": ", status.message()));
+  }
+  Log(absl::StrCat("the last map is set aside: ", status.message()));
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, EventSink& sink,
@@ -118,10 +136,18 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, E
   ApplyLimits(config, options.anchors);
   options.mount = opened->mount.mount;
   options.crop = opened->mount.crop;
+  std::shared_ptr<MapKeeper> maps;
+  if (config.map != "none") {
+    maps = std::make_shared<MapKeeper>(MapKeeperOptions{.directory = config.data_dir / "maps"});
+  }
+  options.maps = maps;
   options.every_frame = config.every_frame;
   options.video_bit_rate_bit_s = config.video_bit_rate_bit_s;
-  return Engine::Create(std::move(options), std::move(opened->source), *std::move(tracker),
-                        *std::move(store), sink);
+  auto engine = Engine::Create(std::move(options), std::move(opened->source), *std::move(tracker),
+                               *std::move(store), sink);
+  if (!engine.ok() || !maps || config.map == "new") return engine;
+  if (absl::Status resumed = ResumeFirst(config, *maps, **engine); !resumed.ok()) return resumed;
+  return engine;
 }
 
 void SayReady(const ServerConfig& config, int grpc_port, int http_port) {

@@ -63,6 +63,7 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"MapService/Reset", kPilot},  // everybody's marks lose their place
     {"MapService/Save", kPilot},
     {"MapService/Load", kPilot},
+    {"MapService/Delete", kPilot},
 
     {"GazeService/GetState", kViewer},
     {"GazeService/GetMountCalibration", kViewer},

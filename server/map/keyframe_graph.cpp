@@ -88,6 +88,31 @@ void KeyframeGraph::Erase(KeyframeId id) {
   keyframes_.erase(id);
 }
 
+bool KeyframeGraph::Load(Contents contents) {
+  for (const auto& [id, keyframe] : contents.keyframes) {
+    if (id < 0) return false;
+    for (const FeatureId born : keyframe.births) {
+      const auto point = contents.points.find(born);
+      if (point == contents.points.end() || point->second.anchor != id) return false;
+    }
+  }
+  for (const auto& [id, point] : contents.points) {
+    if (!contents.keyframes.contains(point.anchor) || point.birth.id != id) return false;
+    if (!std::is_sorted(point.seen_from.begin(), point.seen_from.end())) return false;
+    for (const KeyframeId from : point.seen_from) {
+      if (!contents.keyframes.contains(from)) return false;
+    }
+  }
+  Clear();
+  keyframes_ = std::move(contents.keyframes);
+  points_ = std::move(contents.points);
+  for (auto& [id, keyframe] : keyframes_) {
+    keyframe.version = ++changes_;
+    next_ = id + 1;
+  }
+  return true;
+}
+
 std::optional<Rigid3> KeyframeGraph::Newest() const {
   if (keyframes_.empty()) return std::nullopt;
   return keyframes_.rbegin()->second.world_from_camera;

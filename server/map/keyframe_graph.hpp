@@ -143,7 +143,6 @@ class KeyframeGraph {
   /// Takes an adjusted job over; keyframes added meanwhile move along with the newest of the job.
   void Take(const Job& job);
 
- private:
   struct Keyframe {
     Rigid3 world_from_camera;
     double distance_m = 1.0;
@@ -157,6 +156,16 @@ class KeyframeGraph {
     GraphEstimate estimate;
     std::vector<KeyframeId> seen_from;  // rising
   };
+  /// All of it, for a file.
+  struct Contents {
+    std::map<KeyframeId, Keyframe> keyframes;
+    std::unordered_map<FeatureId, Point> points;
+  };
+  Contents Save() const { return {keyframes_, points_}; }
+  /// In place of what it holds. False, and nothing is changed: they name what is not there.
+  bool Load(Contents contents);
+
+ private:
   using Ranked = std::vector<std::pair<int, KeyframeId>>;
 
   void Thin(const LifeOf& life);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -57,6 +58,8 @@ class LandmarkMap {
  public:
   /// The next free id; ids are never used twice, not even after Clear().
   FeatureId NextId() { return next_id_++; }
+  /// Ids up to this one are taken, by landmarks elsewhere.
+  void SkipIds(FeatureId newest) { next_id_ = std::max(next_id_, newest + 1); }
   void Add(Landmark landmark);
   void Remove(std::span<const FeatureId> ids);
   void Clear() { landmarks_.clear(); }

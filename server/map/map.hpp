@@ -14,6 +14,8 @@
 
 namespace saccade {
 
+struct StoredMap;
+
 /// The one state that a landmark is in.
 enum class LandmarkState {
   kGone,      // forgotten, or never there
@@ -105,6 +107,12 @@ class Map {
   };
   Checkpoint Save(const FilterState& filter) const { return {filter, in_use_, at_rest_}; }
   void Restore(const Checkpoint& checkpoint, FilterState& filter);
+
+  /// What is left of it without the filter: its landmarks come to rest, as well known as they are.
+  void StoreInto(StoredMap& stored, const FilterState& filter) const;
+  /// In place of what it holds; nothing of it is in a filter yet. False, and all is gone: its parts
+  /// do not agree (DecodeMap saw to it that they do).
+  bool Load(const StoredMap& stored);
 
  private:
   CloneId CloneOf(KeyframeId id, const Matrix6d& covariance, FilterState& filter);

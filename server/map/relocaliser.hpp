@@ -97,7 +97,6 @@ class Relocaliser {
   void Clear() { views_.clear(); }
   std::size_t size() const { return views_.size(); }
 
- private:
   struct PlaceView {
     FrameId frame = 0;
     Rigid3 world_from_camera;
@@ -108,6 +107,13 @@ class Relocaliser {
     ViewCorners corners;
     std::vector<FrameId> partners;  // views its corners are yet to be matched to
   };
+  /// All of it, for a file.
+  const std::vector<PlaceView>& views() const { return views_; }
+  /// In place of what it holds. Their frames are another run's: they get names that none of this
+  /// one has.
+  void Load(std::vector<PlaceView> views);
+
+ private:
   /// A feature or a corner of a view, where it is now.
   struct Known {
     FeatureId id = 0;  // a corner: kCornerBit and its place

@@ -66,6 +66,16 @@ absl::Status Relocaliser::AddView(FrameId frame, const cv::Mat& grey,
   return absl::OkStatus();
 }
 
+void Relocaliser::Load(std::vector<PlaceView> views) {
+  constexpr FrameId kEarlierRun = FrameId{1} << 62;
+  views_ = std::move(views);
+  FrameId name = kEarlierRun;
+  for (PlaceView& view : views_) {
+    view.frame = name++;
+    view.partners.clear();
+  }
+}
+
 void Relocaliser::DropMostRedundant() {
   // The older of the two most alike; the newest stays, its points are the freshest.
   std::size_t drop = 0;

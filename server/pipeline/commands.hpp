@@ -4,12 +4,15 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <variant>
 
 #include "shared/scene/annotation.hpp"
 
 namespace saccade {
+
+struct StoredMap;
 
 /// Answer to a command. Called exactly once, on any thread; must not block.
 template <typename Result>
@@ -48,6 +51,18 @@ struct UndoChange {
 struct ResetMap {
   Done<std::uint64_t> done;  // the new map_generation
 };
+/// A map that outlives the run, and whose coordinates it has.
+struct StoredWorld {
+  std::shared_ptr<const StoredMap> map;  // never null
+  std::string world;                     // UUID
+};
+struct StoreMap {
+  Done<StoredWorld> done;  // FailedPrecondition: too little is mapped yet
+};
+struct ResumeMap {
+  StoredWorld stored;
+  DoneEmpty done;  // once it is looked for
+};
 /// The person cannot come back: what they did can no longer be undone, and its history is dropped.
 struct ForgetPerson {
   std::string person_id;
@@ -55,7 +70,7 @@ struct ForgetPerson {
 };
 
 using Command = std::variant<CreateAnnotation, UpdateAnnotation, DeleteAnnotation, TickItem,
-                             UndoChange, ResetMap, ForgetPerson>;
+                             UndoChange, ResetMap, StoreMap, ResumeMap, ForgetPerson>;
 
 /// Answers a command that will not be carried out.
 void Fail(const Command& command, const absl::Status& status);

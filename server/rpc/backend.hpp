@@ -14,6 +14,7 @@
 #include "server/pipeline/commands.hpp"
 #include "server/pipeline/events.hpp"
 #include "server/pipeline/gaze_commands.hpp"
+#include "server/pipeline/kept_maps.hpp"
 #include "server/pipeline/pointers.hpp"
 #include "server/pipeline/scene_commands.hpp"
 #include "shared/scene/scene_light.hpp"
@@ -77,6 +78,8 @@ class Backend : public CommandPort {
   virtual std::shared_ptr<const Scene> scene() const = 0;
   /// How light falls, as far as it is known.
   virtual SceneLight light() const { return {}; }
+  /// Null: none are kept.
+  virtual KeptMaps* maps() { return nullptr; }
   /// To the scene's thread. On error `done` is not called: ResourceExhausted, Unavailable.
   virtual absl::Status SubmitScene(SceneCommand command) = 0;
 };

@@ -6,7 +6,6 @@
 
 #include "server/rpc/deltas.hpp"
 #include "server/rpc/early_handler.hpp"
-#include "server/rpc/unary_call.hpp"
 
 namespace saccade {
 namespace {
@@ -54,6 +53,7 @@ MapService::MapService(Backend& backend, StreamHub& hub, Gatekeeper& gate)
   MarkMethodCallback(3, Early(gate, "MapService/Save", this, &MapService::Save));
   MarkMethodCallback(4, Early(gate, "MapService/Load", this, &MapService::Load));
   MarkMethodCallback(5, Early(gate, "MapService/List", this, &MapService::List));
+  MarkMethodCallback(6, Early(gate, "MapService/Delete", this, &MapService::Delete));
 }
 
 grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
@@ -101,31 +101,69 @@ grpc::ServerUnaryReactor* MapService::Export(grpc::CallbackServerContext* contex
   return call.Finish(status);
 }
 
-grpc::ServerUnaryReactor* MapService::NotYet(grpc::CallbackServerContext* context,
-                                             const char* method) {
-  UnaryCall call(*context, method, UnaryCall::Log::kNothing);
-  if (const auto access = call.Enter(gate_, Toll::kRead); !access.ok()) {
-    return call.Finish(access.status());
-  }
-  return call.Finish(absl::UnimplementedError(""));
-}
-
 grpc::ServerUnaryReactor* MapService::Save(grpc::CallbackServerContext* context,
-                                           const v1::SaveMapRequest* /*request*/,
-                                           v1::SaveMapResponse* /*response*/) {
-  return NotYet(context, "MapService/Save");
+                                           const v1::SaveMapRequest* request,
+                                           v1::SaveMapResponse* response) {
+  UnaryCall call(*context, "MapService/Save", UnaryCall::Log::kAll);
+  const absl::StatusOr<KeptMaps*> maps = Enter(call, Toll::kReset);
+  if (!maps.ok()) return call.Finish(maps.status());
+  (*maps)->Save(request->name(), call.Answer<std::string>([response](const std::string& id) {
+    response->set_map_id(id);
+  }));
+  return call.reactor();
 }
 
 grpc::ServerUnaryReactor* MapService::Load(grpc::CallbackServerContext* context,
-                                           const v1::LoadMapRequest* /*request*/,
+                                           const v1::LoadMapRequest* request,
                                            v1::LoadMapResponse* /*response*/) {
-  return NotYet(context, "MapService/Load");
+  UnaryCall call(*context, "MapService/Load", UnaryCall::Log::kAll);
+  const absl::StatusOr<KeptMaps*> maps = Enter(call, Toll::kReset);
+  if (!maps.ok()) return call.Finish(maps.status());
+  (*maps)->Load(request->map_id(), call.Answer());
+  return call.reactor();
 }
 
 grpc::ServerUnaryReactor* MapService::List(grpc::CallbackServerContext* context,
                                            const v1::ListMapsRequest* /*request*/,
-                                           v1::ListMapsResponse* /*response*/) {
-  return NotYet(context, "MapService/List");
+                                           v1::ListMapsResponse* response) {
+  UnaryCall call(*context, "MapService/List", UnaryCall::Log::kNothing);
+  const absl::StatusOr<KeptMaps*> maps = Enter(call, Toll::kRead);
+  if (!maps.ok()) return call.Finish(maps.status());
+  (*maps)->List(
+      call.Answer<std::vector<KeptMapFacts>>([response](const std::vector<KeptMapFacts>& all) {
+        for (const KeptMapFacts& facts : all) {
+          response->add_map_ids(facts.id);
+          v1::StoredMapFacts& out = *response->add_maps();
+          out.set_map_id(facts.id);
+          out.set_name(facts.name);
+          out.set_world_id(facts.world);
+          out.set_saved_unix_s(facts.saved_unix_s);
+          out.set_metric(facts.metric);
+          out.set_landmark_count(facts.landmarks);
+          out.set_place_count(facts.places);
+          out.set_width(static_cast<std::uint32_t>(facts.width));
+          out.set_height(static_cast<std::uint32_t>(facts.height));
+          out.set_bytes(facts.bytes);
+        }
+      }));
+  return call.reactor();
+}
+
+grpc::ServerUnaryReactor* MapService::Delete(grpc::CallbackServerContext* context,
+                                             const v1::DeleteMapRequest* request,
+                                             v1::DeleteMapResponse* /*response*/) {
+  UnaryCall call(*context, "MapService/Delete", UnaryCall::Log::kAll);
+  const absl::StatusOr<KeptMaps*> maps = Enter(call, Toll::kReset);
+  if (!maps.ok()) return call.Finish(maps.status());
+  (*maps)->Remove(request->map_id(), call.Answer());
+  return call.reactor();
+}
+
+absl::StatusOr<KeptMaps*> MapService::Enter(UnaryCall& call, Toll toll) {
+  if (const auto access = call.Enter(gate_, toll); !access.ok()) return access.status();
+  if (KeptMaps* maps = backend_.maps()) return maps;
+  return absl::FailedPreconditionError(
+      "maps: this server keeps none: start it with --data-dir and without --map none");
 }
 
 }  // namespace saccade

@@ -4,10 +4,11 @@
 #include "server/rpc/backend.hpp"
 #include "server/rpc/gatekeeper.hpp"
 #include "server/rpc/stream_hub.hpp"
+#include "server/rpc/unary_call.hpp"
 
 namespace saccade {
 
-/// The map at large. Reset is for those who may edit. Save, Load and List answer UNIMPLEMENTED.
+/// The map at large, and those that are kept. Reset, Save, Load and Delete are for those who steer.
 /// Handlers never block.
 class MapService final : public v1::MapService::CallbackService {
  public:
@@ -32,8 +33,11 @@ class MapService final : public v1::MapService::CallbackService {
   grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context,
                                  const v1::ListMapsRequest* request,
                                  v1::ListMapsResponse* response) override;
-  /// UNIMPLEMENTED, to whom the method would be open.
-  grpc::ServerUnaryReactor* NotYet(grpc::CallbackServerContext* context, const char* method);
+  grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context,
+                                   const v1::DeleteMapRequest* request,
+                                   v1::DeleteMapResponse* response) override;
+  /// Whether the call may come in, and where maps are kept.
+  absl::StatusOr<KeptMaps*> Enter(UnaryCall& call, Toll toll);
 
   Backend& backend_;
   StreamHub& hub_;

@@ -39,7 +39,9 @@ std::string AdviceFor(const StatusMonitor& monitor, const Difficulties& seen) {
     case TrackingStatus::kInitialising:
       return WordsForStart(seen);
     case TrackingStatus::kLost: {
-      const std::string lost = "Look again at a place seen before.";
+      const std::string lost = seen.resumes
+                                   ? "Looking for the place mapped before: show what was seen then."
+                                   : "Look again at a place seen before.";
       return seen.too_few_hz ? absl::StrCat(lost, " ", RateWords(*seen.too_few_hz)) : lost;
     }
     case TrackingStatus::kRelocalising:

@@ -11,6 +11,7 @@ namespace saccade {
 struct Difficulties {
   bool waits_for_target = false;
   bool turns_followed = false;        // orientation is known, depth is not yet
+  bool resumes = false;               // looks for a place mapped in an earlier run
   double speed_rad_s = 0.0;           // of the camera
   int in_view = 0;                    // landmarks that were found
   std::optional<double> too_few_hz;   // pictures a second, where more are needed

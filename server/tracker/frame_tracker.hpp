@@ -14,6 +14,8 @@
 
 namespace saccade {
 
+struct StoredMap;
+
 /// What a wearable needs of a tracker: a frame in, a snapshot out. One thread at a time. Tests put
 /// their own in.
 class FrameTracker {
@@ -23,6 +25,15 @@ class FrameTracker {
   virtual std::shared_ptr<const MapSnapshot> Track(const Frame& frame) = 0;
   /// Throws the map away.
   virtual void Reset() = 0;
+  /// What the place can be come back to by, in another run; null: too little of it is known yet.
+  virtual std::shared_ptr<const StoredMap> Store() const { return nullptr; }
+  /// Throws the map away and looks for this one in the frames that come; where it is not found
+  /// within seconds, a new one is begun. Never null.
+  ///   FailedPrecondition  it was made with another lens; the message says which
+  ///   Unimplemented       a tracker that has no maps to come back to
+  virtual absl::Status Resume(std::shared_ptr<const StoredMap> /*map*/) {
+    return absl::UnimplementedError("this tracker cannot come back to a map");
+  }
   /// Starts a feature at a clicked pixel of a past frame.
   virtual absl::StatusOr<FeatureId> SeedFeature(const Frame& clicked_frame,
                                                 const Rigid3& world_from_camera,

@@ -23,6 +23,7 @@ Difficulties Tracker::SeeDifficulties() const {
   constexpr double kFollowedShare = 0.3;  // ...and of the searches
   Difficulties seen;
   seen.waits_for_target = !started_ && starter_.waits_for_target();
+  seen.resumes = resuming_;
   seen.turns_followed = started_ && !held_ && matches_.accepted >= kFollowed &&
                         matches_.accepted >= kFollowedShare * matches_.attempted;
   seen.speed_rad_s = filter_.WholeMotion().angular_velocity_rad_s.norm();

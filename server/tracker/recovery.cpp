@@ -71,6 +71,7 @@ void Tracker::ResumeAfterGap() {
   suspension_.Forget();
   if (!started_) return;
   Revert();
+  if (resuming_) resuming_since_ns_.reset();
   if (monitor_.status() == TrackingStatus::kInitialising || relocaliser_.size() == 0) {
     Reset();
     return;

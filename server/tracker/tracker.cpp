@@ -92,7 +92,8 @@ void Tracker::Reset() {
   before_relocalisation_.reset();
   started_ = metric_ = held_ = has_frame_ = false;
   if (squares_) squares_->Reset();
-  in_squares_world_ = false;
+  in_squares_world_ = resuming_ = false;
+  resuming_since_ns_.reset();
   waited_for_squares_ = 0;
   suspension_.Forget();
   frames_ = frames_lost_ = frames_tracked_ = 0;
@@ -110,6 +111,10 @@ void Tracker::StartAnew(const Frame& frame) {
 
 bool Tracker::Hopeless() const {
   if (!held_) return true;
+  if (resuming_) {
+    return resuming_since_ns_ &&
+           Seconds(last_frame_.capture_time_ns - *resuming_since_ns_) > options_.resume_patience_s;
+  }
   return !metric_ && frames_tracked_ < kYoungMap && frames_lost_ > kPatience;
 }
 
@@ -154,7 +159,11 @@ std::shared_ptr<const MapSnapshot> Tracker::TrackSeen(const Frame& frame) {
   } else {
     Follow(frame, dt);
   }
-  frames_tracked_ += monitor_.status() == TrackingStatus::kTracking ? 1 : 0;
+  if (resuming_ && !resuming_since_ns_) resuming_since_ns_ = frame.capture_time_ns;
+  if (monitor_.status() == TrackingStatus::kTracking) {
+    ++frames_tracked_;
+    resuming_ = false;
+  }
   times_.total_ms = total.Lap_ms() - times_.waited_ms;
   return Publish(frame, times_);
 }

@@ -80,6 +80,9 @@ class Tracker final : public FrameTracker {
   /// Throws the map away; the next frame starts anew (with the target, where there is one in view).
   void Reset() override;
 
+  std::shared_ptr<const StoredMap> Store() const override;
+  absl::Status Resume(std::shared_ptr<const StoredMap> map) override;
+
   /// Starts a feature at something seen in an earlier frame, typically clicked by an expert.
   ///
   /// `clicked_frame` [kept by the caller] with the pose that it was published with; `pixel` in it
@@ -109,7 +112,8 @@ class Tracker final : public FrameTracker {
   void Begin(const Frame& frame);
   /// Lost before there was a map that one could come back to.
   void StartAnew(const Frame& frame);
-  /// Lost, and the map was seen too shortly to be found again: another one is worth more.
+  /// Lost, and the map was seen too shortly to be found again, or is another place's: another one
+  /// is worth more.
   bool Hopeless() const;
   void Follow(const Frame& frame, double dt);
   void Recover(const Frame& frame);
@@ -209,7 +213,10 @@ class Tracker final : public FrameTracker {
   StageTimes times_;
   std::optional<Map::Checkpoint> before_relocalisation_;
   std::unique_ptr<SquareLandmarks> squares_;
-  int waited_for_squares_ = 0;     // frames
+  int waited_for_squares_ = 0;  // frames
+  /// Of the first frame in which a stored map was looked for; it was not found yet.
+  std::optional<Timestamp> resuming_since_ns_;
+  bool resuming_ = false;
   bool in_squares_world_ = false;  // the map's world is that of the known squares
 };
 

@@ -76,6 +76,8 @@ const OptionTable<TrackerOptions>& Table() {
       {"wake", &O::wake, 0, 1, "what rests is taken back where it comes into view"},
       {"loops", &O::loops, 0, 1,
        "a recognised place moves the map; false: only what the search finds"},
+      {"resume_patience_s", &O::resume_patience_s, 0, 3600,
+       "a stored map is looked for, before a new one is begun"},
       {"wake_position_share", &O::wake_position_share, 1e-4, 1,
        "sigma of where it was seen from, of the distance ..."},
       {"wake_angle_sigma_rad", &O::wake_angle_sigma_rad, 1e-4, 1,

@@ -60,6 +60,7 @@ struct TrackerOptions {
   /// 0: when the filter is full. They made up 95 of 250 features of a walk, never seen again.
   int forget_after = 30;
   bool wake = true;  // what left well measured is taken back where it comes into view again
+  double resume_patience_s = 6.0;      // a stored map is looked for, before a new one is begun
   double wake_position_share = 0.01;   // sigma of where it was seen from, of the distance...
   double wake_angle_sigma_rad = 0.01;  // ...and of that camera's direction
   int births_per_clone = 15;           // features that share one pose clone (slam-spec 5.4)

@@ -4,6 +4,8 @@
 #include <utility>
 #include <variant>
 
+#include "server/anchors/edit_checks.hpp"
+
 namespace saccade {
 
 absl::StatusOr<std::unique_ptr<Wearable>> Wearable::Create(
@@ -45,6 +47,11 @@ const WearableStep& Wearable::Step(Frame frame) {
   }
   ring_.Push({step.frame, step.snapshot});
   pointers_->OnSnapshot(step.snapshot);
+  if (generation_ != step.snapshot->map_generation) {
+    generation_ = step.snapshot->map_generation;
+    world_ = resuming_.empty() ? MakeUuid() : std::exchange(resuming_, "");
+    book_->SetWorld(world_);
+  }
   step.moved = book_->OnSnapshot(step.snapshot, *step.frame->camera);
   return newest_.emplace(std::move(step));
 }
@@ -82,6 +89,10 @@ void Wearable::Execute(Command command) {
         } else if constexpr (std::is_same_v<T, ForgetPerson>) {
           book_->ForgetPerson(one.person_id);
           one.done(absl::OkStatus());
+        } else if constexpr (std::is_same_v<T, StoreMap>) {
+          one.done(Store());
+        } else if constexpr (std::is_same_v<T, ResumeMap>) {
+          one.done(Resume(one.stored));
         } else {
           ResetTracker(one);
         }
@@ -97,6 +108,20 @@ void Wearable::ResetTracker(const ResetMap& command) {
     pointers_->OnSnapshot(newest_->snapshot);
   }
   command.done(newest_ ? newest_->snapshot->map_generation : 0);
+}
+
+absl::StatusOr<StoredWorld> Wearable::Store() const {
+  std::shared_ptr<const StoredMap> map = tracker_->Store();
+  if (map && !world_.empty()) return StoredWorld{std::move(map), world_};
+  return absl::FailedPreconditionError(
+      "too little is mapped yet to come back to: look round for some seconds first");
+}
+
+absl::Status Wearable::Resume(const StoredWorld& stored) {
+  if (absl::Status status = tracker_->Resume(stored.map); !status.ok()) return status;
+  resuming_ = stored.world;
+  generation_.reset();
+  return absl::OkStatus();
 }
 
 std::shared_ptr<const AnnotationList> Wearable::annotations() const {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/anchors/annotation_book.hpp"
@@ -56,6 +57,10 @@ class Wearable {
   /// What gaze control needs of the newest frame; there must be one. `angles`: of the head in it.
   GazeView View(const std::optional<MountAngles>& angles) const;
   FrameTracker& tracker() { return *tracker_; }
+  /// FailedPrecondition: too little is mapped yet to come back to.
+  absl::StatusOr<StoredWorld> Store() const;
+  /// As FrameTracker::Resume; what was placed in that world is found again with it.
+  absl::Status Resume(const StoredWorld& stored);
 
   /// Any thread.
   FrameRing& ring() { return ring_; }
@@ -80,6 +85,9 @@ class Wearable {
   std::unique_ptr<AnnotationBook> book_;      // the caller's thread, but for Latest()
   mutable std::timed_mutex book_gone_mutex_;  // held to throw book_ away, and to read it elsewhere
   std::optional<WearableStep> newest_;
+  std::string world_;     // UUID of the map's coordinates
+  std::string resuming_;  // of the map that the tracker looks for, until the next frame
+  std::optional<std::uint64_t> generation_;  // that world_ is of
 };
 
 }  // namespace saccade

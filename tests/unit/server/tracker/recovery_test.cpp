@@ -5,9 +5,12 @@
 #include <ctime>
 #include <filesystem>
 #include <memory>
+#include <random>
+#include <string>
 #include <vector>
 
 #include "server/capture/dataset.hpp"
+#include "server/map/stored_map.hpp"
 #include "server/sim/sim_source.hpp"
 #include "server/tracker/tracker.hpp"
 
@@ -69,6 +72,12 @@ class Player {
   /// From now on the clock is `by_ns` ahead of what it would have been.
   void SetClock(Timestamp by_ns) { start_ns_ += by_ns; }
   Tracker& tracker() { return *tracker_; }
+  /// Another run: its clock starts later, its frames are counted from 0.
+  void BeginAnotherRun(TrackerOptions options = {}) {
+    tracker_ = *Tracker::Create(info_, options);
+    next_ = 0;
+    SetClock(86'400'000'000'000);
+  }
 
  private:
   SourceInfo info_;
@@ -196,6 +205,74 @@ TEST_P(Recovery, ResetStartsANewMap) {
   Snapshot last;
   for (std::size_t k = 302; k < 325; ++k) last = player_->Show(k);
   EXPECT_EQ(last->status, TrackingStatus::kTracking);
+}
+
+TEST_P(Recovery, AnotherRunComesBackToTheStoredMap) {
+  const auto stored = player_->tracker().Store();
+  ASSERT_NE(stored, nullptr);
+  const std::string bytes = EncodeMap(*stored);
+  absl::StatusOr<StoredMap> read = DecodeMap(bytes);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(EncodeMap(*read), bytes);
+  EXPECT_LT(bytes.size(), 20'000'000U);
+
+  TrackerOptions options;
+  options.seed = 2;
+  player_->BeginAnotherRun(options);
+  ASSERT_TRUE(player_->tracker().Resume(std::make_shared<const StoredMap>(*read)).ok());
+  cv::RNG random(7);
+  Snapshot last;
+  for (int k = 0; k < 20; ++k) last = player_->ShowNoise(random);
+  EXPECT_EQ(last->status, TrackingStatus::kLost);
+  EXPECT_NE(last->advice.find("mapped before"), std::string::npos) << last->advice;
+  const std::uint64_t generation = last->map_generation;
+  int waited = 0;
+  for (std::size_t k = 150; k < 300; ++k) {
+    last = player_->Show(k);
+    const bool tracked = last->status == TrackingStatus::kTracking;
+    waited += tracked ? 0 : 1;
+    if (!tracked) continue;
+    EXPECT_LT((last->world_from_camera.translation - poses_[k].translation).norm(), 0.05) << k;
+    EXPECT_LT(RotationAngle(last->world_from_camera, poses_[k]), 0.03) << k;
+  }
+  EXPECT_EQ(last->status, TrackingStatus::kTracking);
+  EXPECT_EQ(last->map_generation, generation) << "the stored map, not another";
+  EXPECT_LT(waited, 60);  // 2 s
+  EXPECT_NE(player_->tracker().Store(), nullptr) << "and it can be stored again";
+}
+
+TEST_P(Recovery, AnotherPlaceIsNotWaitedForLongerThanSaid) {
+  const auto stored = player_->tracker().Store();
+  ASSERT_NE(stored, nullptr);
+  TrackerOptions options;
+  options.resume_patience_s = 0.5;
+  player_->BeginAnotherRun(options);
+  ASSERT_TRUE(player_->tracker().Resume(stored).ok());
+  cv::RNG random(7);
+  const std::uint64_t generation = player_->ShowNoise(random)->map_generation;
+  Snapshot last;
+  for (int k = 0; k < 20; ++k) last = player_->ShowNoise(random);
+  EXPECT_EQ(last->map_generation, generation + 1);
+  for (std::size_t k = 100; k < 140; ++k) last = player_->Show(k);
+  EXPECT_EQ(last->status, TrackingStatus::kTracking);
+}
+
+TEST_P(Recovery, ADamagedMapIsRefused) {
+  const auto stored = player_->tracker().Store();
+  ASSERT_NE(stored, nullptr);
+  const std::string bytes = EncodeMap(*stored);
+  std::mt19937_64 random(3);
+  for (int k = 0; k < 60; ++k) {
+    EXPECT_FALSE(DecodeMap(absl::string_view(bytes).substr(0, random() % bytes.size())).ok());
+    std::string damaged = bytes;
+    for (int n = 0; n < 20; ++n) damaged[random() % 4000] = static_cast<char>(random());
+    DecodeMap(damaged).IgnoreError();  // must not crash; what it lets through is checked
+  }
+  EXPECT_FALSE(DecodeMap(bytes + "x").ok());
+  StoredMap other = *stored;
+  other.lens.fx *= 1.1;
+  EXPECT_EQ(player_->tracker().Resume(std::make_shared<const StoredMap>(other)).code(),
+            absl::StatusCode::kFailedPrecondition);
 }
 
 INSTANTIATE_TEST_SUITE_P(Recordings, Recovery,
