@@ -73,7 +73,7 @@ struct MapState {
   std::vector<FeatureSnapshot> features;
 };
 
-/// A file of the map, ready to be written.
+/// What is known of a map on the server's disk.
 struct StoredMapFacts {
   std::string id, name, world;  // no name: kept by the server itself
   std::int64_t saved_unix_s = 0;
@@ -82,6 +82,7 @@ struct StoredMapFacts {
   std::uint64_t bytes = 0;
 };
 
+/// A file of the map, ready to be written.
 struct MapExport {
   std::string data;
   std::uint32_t feature_count = 0;
