@@ -72,7 +72,7 @@ bool RecognisesColmap(const CameraDocument& document) {
          IsNumber(words[3]);
 }
 
-absl::StatusOr<Line> Choose(const CameraDocument& document) {
+absl::StatusOr<Line> ChooseColmapLine(const CameraDocument& document) {
   const std::vector<Line> lines = Cameras(document.text);
   std::vector<absl::string_view> ids;
   for (const Line& line : lines) {
@@ -129,7 +129,7 @@ absl::Status TakeParameters(const Model& model, const std::vector<absl::string_v
 }
 
 absl::Status ReadColmap(CameraDocument& document, CameraDraft& draft) {
-  const absl::StatusOr<Line> line = Choose(document);
+  const absl::StatusOr<Line> line = ChooseColmapLine(document);
   if (!line.ok()) return line.status();
   const std::vector<absl::string_view>& words = line->words;
   for (const char* field : {"model", "width", "height", "fx", "fy", "cx", "cy", "distortion"}) {

@@ -24,7 +24,7 @@ bool RecognisesKalibr(const CameraDocument& document) {
 }
 
 /// The camera that was asked for, or the first.
-std::string Choose(CameraDocument& document) {
+std::string ChooseKalibrCamera(CameraDocument& document) {
   std::vector<std::string> cameras;
   for (const std::string& key : document.yaml.Keys()) {
     if (IsCamera(document.yaml, key)) cameras.push_back(key);
@@ -63,7 +63,7 @@ void TakeOmni(YamlReader& yaml, const std::string& prefix, CameraDraft& draft) {
 }
 
 absl::Status ReadKalibr(CameraDocument& document, CameraDraft& draft) {
-  draft.camera = Choose(document);
+  draft.camera = ChooseKalibrCamera(document);
   const std::string prefix = draft.camera + ".";
   YamlReader yaml = document.yaml.Map(draft.camera);
   TakeResolution(yaml, "resolution", prefix, draft);

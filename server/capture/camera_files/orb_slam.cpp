@@ -15,7 +15,7 @@ bool RecognisesOrbSlam(const CameraDocument& document) {
 }
 
 /// "Camera", "Camera1" or what was asked for: "Camera2", the right one.
-std::string Choose(const CameraDocument& document) {
+std::string ChooseOrbSlamCamera(const CameraDocument& document) {
   if (!document.camera.empty()) return document.camera;
   return document.yaml.Has("Camera1.fx") ? "Camera1" : "Camera";
 }
@@ -51,7 +51,7 @@ void TakeCoefficients(YamlReader& yaml, const std::string& camera, CameraDraft& 
 
 absl::Status ReadOrbSlam(CameraDocument& document, CameraDraft& draft) {
   YamlReader& yaml = document.yaml;
-  const std::string camera = Choose(document), prefix = camera + ".";
+  const std::string camera = ChooseOrbSlamCamera(document), prefix = camera + ".";
   draft.camera = document.camera;
   if (!document.camera.empty() && !yaml.Has(prefix + "fx")) {
     yaml.Fail(prefix + "fx", "there is no such camera; use Camera, Camera1 or Camera2");
