@@ -27,6 +27,13 @@ struct RunArguments {
   double view_deg = 0;  // 0: as camera.yaml says
   bool json = false;
 };
+struct RestartArguments {
+  std::filesystem::path dataset, out;
+  std::string source;     // sim:..., instead of a data set
+  std::string elsewhere;  // sim:..., that the second run sees instead
+  std::uint64_t seed = 1;
+  TrackerArguments tracker;
+};
 struct ScoreArguments {
   std::filesystem::path estimate, truth;
   std::string align = "se3";
@@ -102,6 +109,11 @@ struct PoseGraphArguments {
 /// back.
 absl::Status RunCommand(const RunArguments& arguments);
 absl::Status ScoreCommand(const ScoreArguments& arguments);
+/// Maps and marks the first half of a recording with its truth, or of a simulation, and looks in
+/// another run for map and marks in the second half. Prints and writes report.json: when the map
+/// was found, how many marks came back and how far off [px, m of the truth]; `elsewhere`: whether
+/// the map was rightly given up.
+absl::Status RestartCommand(const RestartArguments& arguments);
 absl::Status SimCommand(const SimArguments& arguments);
 /// Writes frames of a simulated source as the lens saw them, without noise: DIR/000123.png.
 absl::Status RenderCommand(const RenderArguments& arguments);

@@ -99,6 +99,27 @@ void AddTeam(CLI::App& app, TeamArguments& arguments) {
   team->footer(TeamSettingsHelp());
 }
 
+void AddRestart(CLI::App& app, RestartArguments& arguments) {
+  CLI::App* restart = app.add_subcommand(
+      "restart",
+      "Map and mark the first half, come back in another run in the second; prints JSON");
+  auto* dataset = restart->add_option("--dataset", arguments.dataset,
+                                      "Folder in TUM or EuRoC layout, with groundtruth.txt");
+  restart->add_option("--source", arguments.source, "sim:desk?..., instead; 20 s if it has no end")
+      ->excludes(dataset);
+  restart->add_option("--elsewhere", arguments.elsewhere,
+                      "sim:desk?..., that the second run sees instead: its map is another");
+  restart->add_option("--seed", arguments.seed, "Of the first run; the second has the next one")
+      ->check(NotNegative())
+      ->capture_default_str();
+  restart->add_option("--out", arguments.out, "Folder for report.json, map and marks")->required();
+  restart->add_option("--config", arguments.tracker.config, "TOML file with tracker options");
+  restart
+      ->add_option("--set", arguments.tracker.set,
+                   "One tracker option as key=value; may be repeated")
+      ->take_all();
+}
+
 void AddScore(CLI::App& app, ScoreArguments& arguments) {
   CLI::App* score = app.add_subcommand("score", "Compare two trajectories; prints JSON");
   score->add_option("--estimate", arguments.estimate, "TUM file")->required();
@@ -302,6 +323,7 @@ int Main(int argc, char** argv) {
     return absl::StrCat(failed->get_name(), ": ", error.what(), "; see --help\n");
   });
   RunArguments run;
+  RestartArguments restart;
   ScoreArguments score;
   SimArguments sim;
   RenderArguments render, record;
@@ -314,6 +336,7 @@ int Main(int argc, char** argv) {
   TeamArguments team;
   occlusion.count = 100;
   AddRun(app, run);
+  AddRestart(app, restart);
   AddScore(app, score);
   AddSim(app, sim);
   AddRender(app, render);
@@ -333,6 +356,7 @@ int Main(int argc, char** argv) {
   }
   absl::Status status;
   if (app.got_subcommand("run")) status = RunCommand(run);
+  if (app.got_subcommand("restart")) status = RestartCommand(restart);
   if (app.got_subcommand("score")) status = ScoreCommand(score);
   if (app.got_subcommand("sim")) status = SimCommand(sim);
   if (app.got_subcommand("render")) status = RenderCommand(render);

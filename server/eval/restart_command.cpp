@@ -1,0 +1,287 @@
+// A place that is left and come back to: the first half of a recording is mapped and marked,
+// another run finds the map and the marks again in the second.
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <functional>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "server/capture/dataset.hpp"
+#include "server/eval/commands.hpp"
+#include "server/eval/eval_wearable.hpp"
+#include "server/eval/output_file.hpp"
+#include "server/eval/score.hpp"
+#include "server/eval/statistics.hpp"
+#include "server/map/stored_map.hpp"
+#include "server/sim/sim_source.hpp"
+#include "server/store/annotation_store.hpp"
+#include "server/store/map_shelf.hpp"
+#include "shared/io/regular_file.hpp"
+
+namespace saccade {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kMarks = 10;
+constexpr double kMarksFrom = 0.6;  // of the first half
+
+/// Frames with what is known of where each was truly taken.
+struct Recording {
+  std::unique_ptr<FrameSource> source;
+  SourceInfo info;  // nobody knows of a target
+  std::uint64_t frames = 0;
+  std::function<std::optional<Rigid3>(const Frame&)> truth;
+};
+
+absl::StatusOr<Recording> OpenSimulated(const RestartArguments& arguments) {
+  absl::StatusOr<SimOptions> options = SimOptions::FromUri(arguments.source);
+  if (!options.ok()) return options.status();
+  if (!options->duration_s) options->duration_s = 20.0;
+  absl::StatusOr<std::unique_ptr<SimSource>> source = SimSource::Open(*options);
+  if (!source.ok()) return source.status();
+  Recording recording;
+  recording.frames = static_cast<std::uint64_t>(*options->duration_s * options->fps);
+  recording.truth = [sim = source->get()](const Frame& frame) -> std::optional<Rigid3> {
+    return sim->WorldFromCamera(frame.id);
+  };
+  recording.source = *std::move(source);
+  return recording;
+}
+
+absl::StatusOr<Recording> OpenRecorded(const RestartArguments& arguments) {
+  auto source = OpenDataset(arguments.dataset, SourceOptions());
+  if (!source.ok()) return source.status();
+  const auto file = arguments.dataset / "groundtruth.txt";
+  if (!MayExist(file)) {
+    return absl::NotFoundError(
+        absl::StrCat(file.string(), ": without it nobody knows where the marks belong"));
+  }
+  absl::StatusOr<Trajectory> truth = LoadTrajectory(file);
+  if (!truth.ok()) return truth.status();
+  Recording recording;
+  recording.source = *std::move(source);
+  recording.frames = recording.source->info().frame_count.value_or(0);
+  const Timestamp gap_ns = 2 * MedianInterval(*truth);
+  recording.truth = [truth = *std::move(truth), gap_ns](const Frame& frame) {
+    return PoseAt(truth, frame.capture_time_ns, std::max<Timestamp>(gap_ns, 50'000'000),
+                  20'000'000);
+  };
+  return recording;
+}
+
+absl::StatusOr<Recording> Open(const RestartArguments& arguments) {
+  if (arguments.source.empty() && arguments.dataset.empty()) {
+    return absl::InvalidArgumentError("restart: give --dataset or --source");
+  }
+  absl::StatusOr<Recording> recording =
+      arguments.source.empty() ? OpenRecorded(arguments) : OpenSimulated(arguments);
+  if (!recording.ok()) return recording.status();
+  recording->info = recording->source->info();
+  recording->info.target.reset();
+  return recording;
+}
+
+absl::StatusOr<std::unique_ptr<Wearable>> WearableIn(const RestartArguments& arguments,
+                                                     const Recording& recording,
+                                                     std::uint64_t seed) {
+  TrackerArguments setup = arguments.tracker;
+  setup.set.push_back(absl::StrCat("seed=", seed));
+  absl::StatusOr<std::unique_ptr<FrameTracker>> tracker = MakeFrameTracker(recording.info, setup);
+  if (!tracker.ok()) return tracker.status();
+  absl::StatusOr<std::unique_ptr<AnnotationStore>> store =
+      AnnotationStore::Open(arguments.out / "data");
+  if (!store.ok()) return store.status();
+  return Wearable::Create(recording.info, *std::move(tracker), AnchorOptions(), *std::move(store));
+}
+
+/// Clicks on a feature that this frame measured and whose depth is known, each time another.
+void MarkSomething(Wearable& wearable, int number) {
+  std::vector<const FeatureSnapshot*> seen;
+  const auto snapshot = wearable.newest()->snapshot;
+  for (const FeatureSnapshot& feature : snapshot->features) {
+    if (feature.depth_known && feature.pixel && feature.state == FeatureState::kMeasured) {
+      seen.push_back(&feature);
+    }
+  }
+  if (seen.empty()) return;
+  const FeatureSnapshot& chosen = *seen[static_cast<std::size_t>(number) * 7919 % seen.size()];
+  AnnotationDraft draft;
+  draft.request_id = absl::StrFormat("00000000-0000-4000-8000-%012d", number + 1);
+  draft.author = "expert";
+  draft.target = PixelTarget{snapshot->frame_id, *chosen.pixel};
+  wearable.Execute(CreateAnnotation{
+      .editor = "expert", .draft = std::move(draft), .done = [](const auto& /*answer*/) {}});
+}
+
+struct FirstRun {
+  Similarity truth_from_world;
+  std::vector<Annotation> marks;  // as they were at its end
+  double ate_m = 0;
+  bool metric = false;
+};
+
+absl::StatusOr<FirstRun> MapAndMark(const RestartArguments& arguments, MapShelf& shelf) {
+  absl::StatusOr<Recording> recording = Open(arguments);
+  if (!recording.ok()) return recording.status();
+  absl::StatusOr<std::unique_ptr<Wearable>> wearable =
+      WearableIn(arguments, *recording, arguments.seed);
+  if (!wearable.ok()) return wearable.status();
+  const std::uint64_t half = recording->frames / 2;
+  const auto from = static_cast<std::uint64_t>(kMarksFrom * static_cast<double>(half));
+  const std::uint64_t every = std::max<std::uint64_t>(1, (half - from) / (kMarks + 1));
+  std::vector<PosePair> pairs;
+  int marks = 0;
+  for (std::uint64_t k = 0; k < half; ++k) {
+    auto frame = recording->source->Next();
+    if (!frame.ok()) return frame.status();
+    if (!*frame) break;
+    const std::optional<Rigid3> truth = recording->truth(**frame);
+    const Timestamp now_ns = (*frame)->capture_time_ns;
+    const WearableStep& step = (*wearable)->Step(**std::move(frame));
+    if (step.snapshot->status != TrackingStatus::kTracking) continue;
+    if (truth) pairs.push_back({now_ns, step.snapshot->world_from_camera, *truth});
+    if (k >= from && marks < kMarks && (k - from) % every == 0) {
+      MarkSomething(**wearable, marks++);
+    }
+  }
+  if (absl::Status flushed = (*wearable)->Flush(std::chrono::seconds(10)); !flushed.ok()) {
+    return flushed;
+  }
+  (*wearable)->Settle();
+  FirstRun first;
+  if (pairs.size() < 3) {
+    return absl::FailedPreconditionError("restart: the first half was not tracked");
+  }
+  first.metric = (*wearable)->newest()->snapshot->metric;
+  const auto alignment = first.metric ? TrajectoryAlignment::kSe3 : TrajectoryAlignment::kSim3;
+  std::vector<Eigen::Vector3d> source, target;
+  for (const PosePair& pair : pairs) {
+    source.push_back(pair.estimate.translation);
+    target.push_back(pair.truth.translation);
+  }
+  first.truth_from_world = AlignPoints(source, target, alignment);
+  if (const auto score = Score(pairs, alignment); score.ok()) {
+    first.ate_m = first.metric ? score->ate_se3_m : score->ate_sim3_m;
+  }
+  first.marks = *(*wearable)->annotations();
+  absl::StatusOr<StoredWorld> stored = (*wearable)->Store();
+  if (!stored.ok()) return stored.status();
+  KeptMapFacts facts;
+  facts.id = facts.world = stored->world;
+  facts.saved_unix_s = 1;
+  if (absl::Status saved = shelf.Save(facts, *stored->map); !saved.ok()) return saved;
+  return first;
+}
+
+struct SecondRun {
+  std::optional<double> found_s;  // after its first frame
+  std::uint64_t frames = 0, tracked = 0;
+  bool another_map = false;  // the stored one was given up
+  int back = 0;              // marks whose place was known again
+  Sample marks_px, marks_m, pose_m;
+};
+
+absl::StatusOr<SecondRun> ComeBack(const RestartArguments& arguments, const FirstRun& first,
+                                   MapShelf& shelf) {
+  RestartArguments place = arguments;
+  if (!arguments.elsewhere.empty()) place.source = arguments.elsewhere;
+  absl::StatusOr<Recording> recording = Open(place);
+  if (!recording.ok()) return recording.status();
+  absl::StatusOr<std::unique_ptr<Wearable>> wearable =
+      WearableIn(arguments, *recording, arguments.seed + 1);
+  if (!wearable.ok()) return wearable.status();
+  const std::vector<KeptMapFacts> kept = shelf.List();
+  if (kept.empty()) return absl::DataLossError("restart: the map that was saved is not there");
+  absl::StatusOr<MapShelf::Kept> read = shelf.Load(kept.front().id);
+  if (!read.ok()) return read.status();
+  const StoredWorld stored{std::make_shared<const StoredMap>(std::move(read->map)),
+                           read->facts.world};
+  if (absl::Status resumed = (*wearable)->Resume(stored); !resumed.ok()) return resumed;
+  SecondRun second;
+  std::optional<Timestamp> begin_ns;
+  std::optional<std::uint64_t> generation;
+  std::vector<bool> back(first.marks.size());
+  for (std::uint64_t k = 0; k < recording->frames; ++k) {
+    auto frame = recording->source->Next();
+    if (!frame.ok()) return frame.status();
+    if (!*frame) break;
+    if (k < recording->frames / 2) continue;
+    const std::optional<Rigid3> truth = recording->truth(**frame);
+    const Timestamp now_ns = (*frame)->capture_time_ns;
+    if (!begin_ns) begin_ns = now_ns;
+    const WearableStep& step = (*wearable)->Step(**std::move(frame));
+    if (!generation) generation = step.snapshot->map_generation;
+    ++second.frames;
+    if (step.snapshot->map_generation != *generation) {
+      second.another_map = true;
+      break;
+    }
+    if (step.snapshot->status != TrackingStatus::kTracking) continue;
+    ++second.tracked;
+    if (!second.found_s) second.found_s = Seconds(now_ns - *begin_ns);
+    if (!truth) continue;
+    const Rigid3& pose = step.snapshot->world_from_camera;
+    second.pose_m.Add((first.truth_from_world * pose.translation - truth->translation).norm());
+    const auto now = (*wearable)->annotations();
+    for (std::size_t m = 0; m < first.marks.size(); ++m) {
+      const auto mark = std::find_if(now->begin(), now->end(), [&](const Annotation& one) {
+        return one.id == first.marks[m].id;
+      });
+      if (mark == now->end() || !mark->anchor.place_known) continue;
+      back[m] = true;
+      const Eigen::Vector3d belongs = first.truth_from_world * first.marks[m].anchor.point_in_world;
+      second.marks_m.Add((first.truth_from_world * mark->anchor.point_in_world - belongs).norm());
+      const CameraModel& camera = *step.frame->camera;
+      const auto drawn = camera.Project(pose.Inverse() * mark->anchor.point_in_world);
+      const auto true_pixel = camera.Project(truth->Inverse() * belongs);
+      if (drawn && true_pixel && camera.InImage(*true_pixel)) {
+        second.marks_px.Add((*drawn - *true_pixel).norm());
+      }
+    }
+  }
+  second.back = static_cast<int>(std::count(back.begin(), back.end(), true));
+  return second;
+}
+
+}  // namespace
+
+absl::Status RestartCommand(const RestartArguments& arguments) {
+  std::error_code error;
+  std::filesystem::remove_all(arguments.out / "data", error);
+  std::filesystem::create_directories(arguments.out, error);
+  MapShelf shelf(arguments.out / "data" / "maps");
+  const absl::StatusOr<FirstRun> first = MapAndMark(arguments, shelf);
+  if (!first.ok()) return first.status();
+  const absl::StatusOr<SecondRun> second = ComeBack(arguments, *first, shelf);
+  if (!second.ok()) return second.status();
+  const std::vector<KeptMapFacts> kept = shelf.List();
+  Json report;
+  report["map_bytes"] = kept.front().bytes;
+  report["landmarks"] = kept.front().landmarks;
+  report["places"] = kept.front().places;
+  report["ate_first_half_m"] = first->ate_m;
+  report["another_map"] = second->another_map;
+  report["found_after_s"] = second->found_s ? Json(*second->found_s) : Json(nullptr);
+  report["frames"] = second->frames;
+  report["tracked"] = second->tracked;
+  report["marks"] = first->marks.size();
+  report["marks_back"] = second->back;
+  const auto both = [&](const char* key, const Sample& sample) {
+    report[key] = sample.size() == 0
+                      ? Json(nullptr)
+                      : Json{{"median", sample.Percentile(50)}, {"p95", sample.Percentile(95)}};
+  };
+  both("marks_px", second->marks_px);
+  both("marks_m", second->marks_m);
+  both("pose_m", second->pose_m);
+  const std::string text = report.dump(2) + "\n";
+  std::cout << text;
+  return WriteFileAtomically(arguments.out / "report.json", text);
+}
+
+}  // namespace saccade
