@@ -1,7 +1,7 @@
 #include "server/store/map_shelf.hpp"
 
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -82,34 +82,34 @@ std::optional<absl::string_view> TakePart(absl::string_view& rest) {
   return part;
 }
 
-absl::Status Damaged(const fs::path& file, absl::string_view what) {
+absl::Status DamagedMap(const fs::path& file, absl::string_view what) {
   return absl::DataLossError(absl::StrCat(file.string(), ": ", what));
 }
 
 /// Takes everything before the map itself off the front of `bytes`.
 absl::StatusOr<KeptMapFacts> TakeFacts(const fs::path& file, absl::string_view& bytes) {
-  if (!absl::ConsumePrefix(&bytes, kMagic)) return Damaged(file, "is no map of saccade's");
+  if (!absl::ConsumePrefix(&bytes, kMagic)) return DamagedMap(file, "is no map of saccade's");
   ArchiveReader head(bytes.substr(0, sizeof(kVersion)));
   std::uint32_t version = 0;
   head.Number(version);
-  if (!head.ok()) return Damaged(file, "is cut short");
+  if (!head.ok()) return DamagedMap(file, "is cut short");
   bytes.remove_prefix(sizeof(kVersion));
   if (version > kVersion) {
-    return Damaged(file, absl::StrCat("is of version ", version, "; this server reads ", kVersion,
-                                      ": use the newer server, which wrote it"));
+    return DamagedMap(file, absl::StrCat("is of version ", version, "; this server reads ",
+                                         kVersion, ": use the newer server, which wrote it"));
   }
   KeptMapFacts facts;
   const auto part = TakePart(bytes);
   ArchiveReader reader(part.value_or(absl::string_view()));
   Fields(reader, facts);
-  if (!part || !reader.ok() || !reader.at_end()) return Damaged(file, kRemedy);
+  if (!part || !reader.ok() || !reader.at_end()) return DamagedMap(file, kRemedy);
   return facts;
 }
 
 /// Facts of what is whole as far as they go, without reading the rest.
 absl::StatusOr<KeptMapFacts> ReadFacts(const fs::path& file) {
   std::error_code error;
-  if (!fs::is_regular_file(file, error)) return Damaged(file, "is no regular file");
+  if (!fs::is_regular_file(file, error)) return DamagedMap(file, "is no regular file");
   std::string begin(kMostFacts, '\0');
   std::ifstream in(file, std::ios::binary);
   in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
@@ -189,7 +189,7 @@ absl::StatusOr<MapShelf::Kept> MapShelf::Load(const std::string& id) {
   absl::StatusOr<KeptMapFacts> facts = TakeFacts(file, rest);
   if (!facts.ok()) return facts.status();
   const auto part = TakePart(rest);
-  if (!part || !rest.empty()) return Damaged(file, kRemedy);
+  if (!part || !rest.empty()) return DamagedMap(file, kRemedy);
   absl::StatusOr<StoredMap> map = DecodeMap(*part);
   if (!map.ok()) {
     return absl::DataLossError(absl::StrCat(file.string(), ": ", map.status().message()));
