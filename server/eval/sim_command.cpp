@@ -128,7 +128,7 @@ void AddClaims(const Json& claims, std::string& text) {
   }
 }
 
-std::string Table(const Json& report) {
+std::string SimTable(const Json& report) {
   std::string text;
   for (const auto& [key, value] : report.items()) {
     if (key == "claims") {
@@ -178,7 +178,7 @@ absl::Status SimCommand(const SimArguments& asked) {
   const absl::Status written =
       WriteFileAtomically(arguments.out / "report.json", report->dump(2) + "\n");
   if (!written.ok()) return written;
-  std::cout << (arguments.json ? report->dump(2) + "\n" : Table(*report));
+  std::cout << (arguments.json ? report->dump(2) + "\n" : SimTable(*report));
   return absl::OkStatus();
 }
 
