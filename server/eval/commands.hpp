@@ -111,7 +111,8 @@ absl::Status RunCommand(const RunArguments& arguments);
 absl::Status ScoreCommand(const ScoreArguments& arguments);
 /// Maps and marks the first half of a recording with its truth, or of a simulation, and looks in
 /// another run for map and marks in the second half. Prints and writes report.json: when the map
-/// was found, how many marks came back and how far off [px, m of the truth]; `elsewhere`: whether
+/// was found, how many marks came back, how far they are from where the first run, had it gone on,
+/// draws them [px; m in the camera's frame], and the poses from their truth. `elsewhere`: whether
 /// the map was rightly given up.
 absl::Status RestartCommand(const RestartArguments& arguments);
 absl::Status SimCommand(const SimArguments& arguments);

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <functional>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "server/capture/dataset.hpp"
 #include "server/eval/commands.hpp"
@@ -27,6 +29,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr char kData[] = "data", kKept[] = "kept";  // of the first run, and as it was half-way
 constexpr int kMarks = 10;
 constexpr double kMarksFrom = 0.6;  // of the first half
 
@@ -87,14 +90,13 @@ absl::StatusOr<Recording> Open(const RestartArguments& arguments) {
 }
 
 absl::StatusOr<std::unique_ptr<Wearable>> WearableIn(const RestartArguments& arguments,
-                                                     const Recording& recording,
-                                                     std::uint64_t seed) {
+                                                     const Recording& recording, bool again) {
   TrackerArguments setup = arguments.tracker;
-  setup.set.push_back(absl::StrCat("seed=", seed));
+  setup.set.push_back(absl::StrCat("seed=", arguments.seed + (again ? 1 : 0)));
   absl::StatusOr<std::unique_ptr<FrameTracker>> tracker = MakeFrameTracker(recording.info, setup);
   if (!tracker.ok()) return tracker.status();
   absl::StatusOr<std::unique_ptr<AnnotationStore>> store =
-      AnnotationStore::Open(arguments.out / "data");
+      AnnotationStore::Open(arguments.out / (again ? kKept : kData));
   if (!store.ok()) return store.status();
   return Wearable::Create(recording.info, *std::move(tracker), AnchorOptions(), *std::move(store));
 }
@@ -118,42 +120,79 @@ void MarkSomething(Wearable& wearable, int number) {
       .editor = "expert", .draft = std::move(draft), .done = [](const auto& /*answer*/) {}});
 }
 
+/// Where a frame's camera has the marks that it can draw [m of the map], by their ids.
+using DrawnMarks = std::map<std::string, Eigen::Vector3d>;
+
+DrawnMarks Drawn(const Wearable& wearable) {
+  DrawnMarks drawn;
+  const MapSnapshot& snapshot = *wearable.newest()->snapshot;
+  if (snapshot.status != TrackingStatus::kTracking) return drawn;
+  const Rigid3 camera_from_world = snapshot.world_from_camera.Inverse();
+  for (const Annotation& mark : *wearable.annotations()) {
+    if (!mark.anchor.place_known) continue;
+    drawn[mark.id] = camera_from_world * mark.anchor.point_in_world;
+  }
+  return drawn;
+}
+
 struct FirstRun {
   Similarity truth_from_world;
-  std::vector<Annotation> marks;  // as they were at its end
+  int marks = 0;
+  std::map<FrameId, DrawnMarks> later;  // the second half, had it not been interrupted
   double ate_m = 0;
   bool metric = false;
 };
+
+/// Map and marks as they are now, on the disk.
+absl::Status KeepAll(const RestartArguments& arguments, Wearable& wearable, MapShelf& shelf) {
+  if (absl::Status kept = wearable.Flush(std::chrono::seconds(10)); !kept.ok()) return kept;
+  wearable.Settle();
+  const absl::StatusOr<StoredWorld> stored = wearable.Store();
+  if (!stored.ok()) return stored.status();
+  KeptMapFacts facts;
+  facts.id = facts.world = stored->world;
+  facts.saved_unix_s = 1;
+  std::error_code error;
+  std::filesystem::copy(arguments.out / kData, arguments.out / kKept,
+                        std::filesystem::copy_options::recursive, error);
+  if (error) return absl::UnavailableError(absl::StrCat("restart: ", error.message()));
+  return shelf.Save(facts, *stored->map);
+}
 
 absl::StatusOr<FirstRun> MapAndMark(const RestartArguments& arguments, MapShelf& shelf) {
   absl::StatusOr<Recording> recording = Open(arguments);
   if (!recording.ok()) return recording.status();
   absl::StatusOr<std::unique_ptr<Wearable>> wearable =
-      WearableIn(arguments, *recording, arguments.seed);
+      WearableIn(arguments, *recording, /*again=*/false);
   if (!wearable.ok()) return wearable.status();
   const std::uint64_t half = recording->frames / 2;
   const auto from = static_cast<std::uint64_t>(kMarksFrom * static_cast<double>(half));
   const std::uint64_t every = std::max<std::uint64_t>(1, (half - from) / (kMarks + 1));
   std::vector<PosePair> pairs;
   int marks = 0;
-  for (std::uint64_t k = 0; k < half; ++k) {
+  FirstRun first;
+  for (std::uint64_t k = 0; k < recording->frames; ++k) {
+    if (k == half) {
+      if (absl::Status kept = KeepAll(arguments, **wearable, shelf); !kept.ok()) return kept;
+      if (!arguments.elsewhere.empty()) break;
+    }
     auto frame = recording->source->Next();
     if (!frame.ok()) return frame.status();
     if (!*frame) break;
     const std::optional<Rigid3> truth = recording->truth(**frame);
     const Timestamp now_ns = (*frame)->capture_time_ns;
+    const FrameId id = (*frame)->id;
     const WearableStep& step = (*wearable)->Step(**std::move(frame));
     if (step.snapshot->status != TrackingStatus::kTracking) continue;
+    if (k >= half) {
+      first.later[id] = Drawn(**wearable);
+      continue;
+    }
     if (truth) pairs.push_back({now_ns, step.snapshot->world_from_camera, *truth});
     if (k >= from && marks < kMarks && (k - from) % every == 0) {
       MarkSomething(**wearable, marks++);
     }
   }
-  if (absl::Status flushed = (*wearable)->Flush(std::chrono::seconds(10)); !flushed.ok()) {
-    return flushed;
-  }
-  (*wearable)->Settle();
-  FirstRun first;
   if (pairs.size() < 3) {
     return absl::FailedPreconditionError("restart: the first half was not tracked");
   }
@@ -168,13 +207,7 @@ absl::StatusOr<FirstRun> MapAndMark(const RestartArguments& arguments, MapShelf&
   if (const auto score = Score(pairs, alignment); score.ok()) {
     first.ate_m = first.metric ? score->ate_se3_m : score->ate_sim3_m;
   }
-  first.marks = *(*wearable)->annotations();
-  absl::StatusOr<StoredWorld> stored = (*wearable)->Store();
-  if (!stored.ok()) return stored.status();
-  KeptMapFacts facts;
-  facts.id = facts.world = stored->world;
-  facts.saved_unix_s = 1;
-  if (absl::Status saved = shelf.Save(facts, *stored->map); !saved.ok()) return saved;
+  first.marks = static_cast<int>((*wearable)->annotations()->size());
   return first;
 }
 
@@ -193,7 +226,7 @@ absl::StatusOr<SecondRun> ComeBack(const RestartArguments& arguments, const Firs
   absl::StatusOr<Recording> recording = Open(place);
   if (!recording.ok()) return recording.status();
   absl::StatusOr<std::unique_ptr<Wearable>> wearable =
-      WearableIn(arguments, *recording, arguments.seed + 1);
+      WearableIn(arguments, *recording, /*again=*/true);
   if (!wearable.ok()) return wearable.status();
   const std::vector<KeptMapFacts> kept = shelf.List();
   if (kept.empty()) return absl::DataLossError("restart: the map that was saved is not there");
@@ -205,7 +238,7 @@ absl::StatusOr<SecondRun> ComeBack(const RestartArguments& arguments, const Firs
   SecondRun second;
   std::optional<Timestamp> begin_ns;
   std::optional<std::uint64_t> generation;
-  std::vector<bool> back(first.marks.size());
+  std::set<std::string> back;
   for (std::uint64_t k = 0; k < recording->frames; ++k) {
     auto frame = recording->source->Next();
     if (!frame.ok()) return frame.status();
@@ -227,24 +260,19 @@ absl::StatusOr<SecondRun> ComeBack(const RestartArguments& arguments, const Firs
     if (!truth) continue;
     const Rigid3& pose = step.snapshot->world_from_camera;
     second.pose_m.Add((first.truth_from_world * pose.translation - truth->translation).norm());
-    const auto now = (*wearable)->annotations();
-    for (std::size_t m = 0; m < first.marks.size(); ++m) {
-      const auto mark = std::find_if(now->begin(), now->end(), [&](const Annotation& one) {
-        return one.id == first.marks[m].id;
-      });
-      if (mark == now->end() || !mark->anchor.place_known) continue;
-      back[m] = true;
-      const Eigen::Vector3d belongs = first.truth_from_world * first.marks[m].anchor.point_in_world;
-      second.marks_m.Add((first.truth_from_world * mark->anchor.point_in_world - belongs).norm());
-      const CameraModel& camera = *step.frame->camera;
-      const auto drawn = camera.Project(pose.Inverse() * mark->anchor.point_in_world);
-      const auto true_pixel = camera.Project(truth->Inverse() * belongs);
-      if (drawn && true_pixel && camera.InImage(*true_pixel)) {
-        second.marks_px.Add((*drawn - *true_pixel).norm());
-      }
+    const CameraModel& camera = *step.frame->camera;
+    const auto uninterrupted = first.later.find(step.frame->id);
+    for (const auto& [id, point] : Drawn(**wearable)) {
+      back.insert(id);
+      if (uninterrupted == first.later.end() || !uninterrupted->second.contains(id)) continue;
+      const Eigen::Vector3d& expected = uninterrupted->second.at(id);
+      const auto there = camera.Project(expected), here = camera.Project(point);
+      if (!there || !here || !camera.InImage(*there)) continue;
+      second.marks_px.Add((*here - *there).norm());
+      second.marks_m.Add(first.truth_from_world.scale * (point - expected).norm());
     }
   }
-  second.back = static_cast<int>(std::count(back.begin(), back.end(), true));
+  second.back = static_cast<int>(back.size());
   return second;
 }
 
@@ -252,9 +280,10 @@ absl::StatusOr<SecondRun> ComeBack(const RestartArguments& arguments, const Firs
 
 absl::Status RestartCommand(const RestartArguments& arguments) {
   std::error_code error;
-  std::filesystem::remove_all(arguments.out / "data", error);
+  std::filesystem::remove_all(arguments.out / kData, error);
+  std::filesystem::remove_all(arguments.out / kKept, error);
   std::filesystem::create_directories(arguments.out, error);
-  MapShelf shelf(arguments.out / "data" / "maps");
+  MapShelf shelf(arguments.out / kKept / "maps");
   const absl::StatusOr<FirstRun> first = MapAndMark(arguments, shelf);
   if (!first.ok()) return first.status();
   const absl::StatusOr<SecondRun> second = ComeBack(arguments, *first, shelf);
@@ -269,7 +298,7 @@ absl::Status RestartCommand(const RestartArguments& arguments) {
   report["found_after_s"] = second->found_s ? Json(*second->found_s) : Json(nullptr);
   report["frames"] = second->frames;
   report["tracked"] = second->tracked;
-  report["marks"] = first->marks.size();
+  report["marks"] = first->marks;
   report["marks_back"] = second->back;
   const auto both = [&](const char* key, const Sample& sample) {
     report[key] = sample.size() == 0
