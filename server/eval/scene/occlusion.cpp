@@ -11,6 +11,7 @@
 
 #include "server/eval/output_file.hpp"
 #include "server/eval/scene/random_room.hpp"
+#include "server/eval/scene/room_mesh.hpp"
 #include "server/scene/scene_view.hpp"
 #include "server/sim/room.hpp"
 #include "server/sim/sim_source.hpp"
@@ -24,24 +25,6 @@ using Eigen::Vector3d;
 constexpr double kDrawnPerPixel = 2.0;  // as the server draws (SceneLayer)
 constexpr int kShownPictures = 8;
 constexpr std::int64_t kLeastPixels = 2000;
-
-/// The room's surfaces as a mesh, in world.
-TriangleMesh RoomMeshOf(const RoomScene& room) {
-  TriangleMesh mesh;
-  for (const SurfacePatch& patch : room.patches) {
-    const auto base = static_cast<std::uint32_t>(mesh.positions.size());
-    mesh.positions.insert(mesh.positions.end(), patch.positions.begin(), patch.positions.end());
-    const auto stride = static_cast<std::uint32_t>(patch.columns + 1);
-    for (std::uint32_t j = 0; j < static_cast<std::uint32_t>(patch.rows); ++j) {
-      for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(patch.columns); ++i) {
-        const std::uint32_t a = base + j * stride + i;
-        mesh.triangles.push_back({a, a + stride, a + 1});
-        mesh.triangles.push_back({a + 1, a + stride, a + stride + 1});
-      }
-    }
-  }
-  return mesh;
-}
 
 /// How far the first triangle is along a ray (Moeller and Trumbore 1997); infinite if there is
 /// none.
