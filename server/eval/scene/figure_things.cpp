@@ -6,7 +6,7 @@
 #include "server/eval/scene/figure_room.hpp"
 #include "server/scene/overlay_things.hpp"
 #include "server/scene/placement.hpp"
-#include "server/scene/shapes.hpp"
+#include "shared/models/shapes.hpp"
 
 namespace saccade {
 namespace {
@@ -128,7 +128,7 @@ absl::StatusOr<std::vector<PlacedMesh>> PushedFurniture(const TriangleMesh& room
 
 absl::StatusOr<std::vector<PlacedMesh>> FurnitureBehindCartons(const TriangleMesh& room) {
   std::vector<Obstacle> obstacles = Obstacles(room);
-  auto shelf = Push(Shelf(), {0.62, -1.8, -0.4}, 0.0, {0, 0, 1}, obstacles);
+  auto shelf = Push(Shelf(), {0.62, -0.1, -0.38}, 0.0, {0, 0, 1}, obstacles);
   if (!shelf.ok()) return shelf.status();
   auto table = Push(Table(), {2.1, -0.1, -1.5}, 0.0, {-1, 0, 0}, obstacles);
   if (!table.ok()) return table.status();

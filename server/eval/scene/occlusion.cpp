@@ -124,7 +124,7 @@ std::optional<PlacedMesh> RandomPlaced(const SimSource& source, std::uint64_t fr
   Append(thing.mesh, Rigid3(), scale, *scaled);
   placed.mesh = std::move(scaled);
   placed.world_from_mesh = {turn, middle - turn * (0.5 * scale * (low + high))};
-  placed.material = SceneMaterial::kVirtual;
+  placed.material = SceneMaterial::kGuide;  // as kVirtual, without a shadow, which is no part of it
   return placed;
 }
 
