@@ -1,5 +1,6 @@
 #include "server/eval/scene/figure_things.hpp"
 
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -102,14 +103,47 @@ cv::Mat PaintHose(int columns, int rows) {
   return small;
 }
 
+void AddTube(const Vector3d& from, const Vector3d& to, double radius, std::uint32_t color,
+             TriangleMesh& mesh) {
+  Append(TubeMesh(std::array{from, to}, radius, color), Rigid3(), 1.0, mesh);
+}
+
 TriangleMesh Person() {
+  constexpr std::uint32_t kTrousers = 0x34455cff, kShirt = 0xd9822bff, kSkin = 0xd8b090ff,
+                          kShoe = 0x33302eff;
   TriangleMesh mesh;
-  for (const double x : {-0.10, 0.10}) AddBox({x, 0, 0}, {0.15, 0.84, 0.18}, 0x34455cff, mesh);
-  AddBox({0, -0.84, 0}, {0.42, 0.60, 0.24}, 0xd9822bff, mesh);
-  for (const double x : {-0.26, 0.26}) AddBox({x, -0.82, 0}, {0.10, 0.58, 0.14}, 0xc9752bff, mesh);
-  AddBox({0, -1.44, 0}, {0.12, 0.08, 0.12}, 0xd8b090ff, mesh);
-  AddBox({0, -1.50, 0}, {0.20, 0.25, 0.22}, 0xd8b090ff, mesh);
+  for (const double x : {-1.0, 1.0}) {
+    AddBox({0.1 * x, 0, -0.04}, {0.10, 0.07, 0.27}, kShoe, mesh);
+    AddTube({0.1 * x, -0.05, 0}, {0.1 * x, -0.48, 0}, 0.06, kTrousers, mesh);
+    AddTube({0.1 * x, -0.44, 0}, {0.09 * x, -0.88, 0}, 0.08, kTrousers, mesh);
+    AddTube({0.2 * x, -1.40, 0}, {0.26 * x, -1.12, 0.02}, 0.055, kShirt, mesh);
+    AddTube({0.26 * x, -1.14, 0.02}, {0.27 * x, -0.86, -0.05}, 0.042, kSkin, mesh);
+  }
+  constexpr std::array kTorso = {0.165, 0.16, 0.155, 0.16, 0.17, 0.18, 0.185, 0.175, 0.14};
+  for (std::size_t k = 0; k < kTorso.size(); ++k) {
+    const double y = -0.84 - 0.07 * static_cast<double>(k);
+    AddTube({0, y, 0}, {0, y - 0.07, 0}, kTorso[k], kShirt, mesh);
+  }
+  AddTube({0, -1.45, 0}, {0, -1.56, 0}, 0.055, kSkin, mesh);
+  constexpr int kSlices = 12;
+  for (int k = 0; k < kSlices; ++k) {  // a head, higher than wide
+    const double t = 2.0 * (k + 0.5) / kSlices - 1.0, y = -1.65 - 0.13 * t;
+    AddTube({0, y + 0.011, 0}, {0, y - 0.011, 0}, 0.105 * std::sqrt(1.0 - t * t), kSkin, mesh);
+  }
   return mesh;
+}
+
+/// Where the room's coordinates begin, as their figure 6 shows it.
+PlacedMesh Axes() {
+  constexpr double kLength_m = 0.5, kThick_m = 0.012;
+  const Vector3d corner(kThick_m, -kThick_m, -kThick_m);
+  TriangleMesh mesh;
+  for (const auto& [way, color] : {std::pair{Vector3d(1, 0, 0), 0xe0261effU},
+                                   {Vector3d(0, -1, 0), 0x2fb04aff},
+                                   {Vector3d(0, 0, -1), 0x2f6fe0ff}}) {
+    Append(ArrowMesh(corner, corner + kLength_m * way, kThick_m, color), Rigid3(), 1.0, mesh);
+  }
+  return Placed(mesh, Vector3d::Zero(), 0, SceneMaterial::kGuide);
 }
 
 }  // namespace
@@ -121,9 +155,9 @@ absl::StatusOr<std::vector<PlacedMesh>> PushedFurniture(const TriangleMesh& room
   Stand(*shelf, obstacles);
   auto table = Push(Table(), {1.9, -0.1, -1.5}, 0.0, {0, 0, 1}, obstacles);
   if (!table.ok()) return table.status();
-  auto chair = Push(Armchair(), {1.0, -0.1, -1.35}, -0.5 * M_PI, {-1, 0, 0}, obstacles);
+  auto chair = Push(Armchair(), {1.0, -0.1, -1.62}, -0.5 * M_PI, {-1, 0, 0}, obstacles);
   if (!chair.ok()) return chair.status();
-  return std::vector<PlacedMesh>{*shelf, *table, *chair};
+  return std::vector<PlacedMesh>{*shelf, *table, *chair, Axes()};
 }
 
 absl::StatusOr<std::vector<PlacedMesh>> FurnitureBehindCartons(const TriangleMesh& room) {
@@ -132,7 +166,7 @@ absl::StatusOr<std::vector<PlacedMesh>> FurnitureBehindCartons(const TriangleMes
   if (!shelf.ok()) return shelf.status();
   auto table = Push(Table(), {2.1, -0.1, -1.5}, 0.0, {-1, 0, 0}, obstacles);
   if (!table.ok()) return table.status();
-  return std::vector<PlacedMesh>{*shelf, *table};
+  return std::vector<PlacedMesh>{*shelf, *table, Axes()};
 }
 
 std::vector<PlacedMesh> DividerAndGrid() {
@@ -161,12 +195,12 @@ std::vector<PlacedMesh> HiddenWires() {
   // Within the wall with the door: three wires to the button, down to a box, off to the ceiling.
   for (int k = 0; k < 3; ++k) {
     const double x = 1.59 + 0.03 * k, y = -0.31 - 0.03 * k;
-    add({{x, -2.45, 0.04}, {x, y, 0.04}, {0.30 - 0.03 * k, y, 0.04}}, 0.008, kWires[k]);
+    add({{x, -2.45, 0.04}, {x, y, 0.04}, {0.02, y, 0.04}}, 0.008, kWires[k]);
   }
   // In the other: hot and cold water, and a drain.
   add({{-0.05, -0.42, -0.1}, {-0.05, -0.42, -1.7}, {-0.05, -2.45, -1.7}}, 0.02, 0xd0452fff);
   add({{-0.05, -0.55, -0.1}, {-0.05, -0.55, -1.58}, {-0.05, -2.45, -1.58}}, 0.02, 0x2f7fd0ff);
-  add({{0.0, -0.16, 0.08}, {3.9, -0.22, 0.08}}, 0.045, 0x8d9499ff);
+  add({{0.0, -0.14, 0.08}, {2.62, -0.19, 0.08}, {2.62, -2.45, 0.08}}, 0.045, 0x8d9499ff);
   return things;
 }
 
@@ -175,15 +209,15 @@ std::vector<PlacedMesh> EscapeRoute() {
       {0.7, 0, -0.5}, {0.95, 0, -1.25}, {2.6, 0, -1.25}, {3.28, 0, -1.05}, {3.3, 0, -0.35}};
   TriangleMesh sign;
   AddBox({0, 0, 0}, {0.5, 0.2, 0.02}, kRouteColor, sign);
-  Append(ArrowMesh({-0.16, -0.1, -0.02}, {0.18, -0.1, -0.02}, 0.022, 0xf4f8f4ff), Rigid3(), 1.0,
+  Append(ArrowMesh({0, -0.18, -0.02}, {0, -0.02, -0.02}, 0.018, 0xf4f8f4ff), Rigid3(), 1.0,
          sign);
   return {Placed(RouteMesh(way, 0.26, kRouteColor), Vector3d::Zero(), 0, SceneMaterial::kGuide),
           Placed(sign, {3.3, -2.14, -0.06}, 0, SceneMaterial::kGuide)};
 }
 
 std::vector<PlacedMesh> RedArrow() {
-  const Vector3d tip = FigureRoom::kAlarm + Vector3d(0.02, 0.01, -0.04);
-  return {Placed(ArrowMesh(tip + Vector3d(0.42, -0.30, -0.42), tip, 0.022, kRed), Vector3d::Zero(),
+  const Vector3d tip = FigureRoom::kAlarm + Vector3d(0.05, -0.04, -0.07);
+  return {Placed(ArrowMesh(tip + Vector3d(0.52, -0.40, -0.30), tip, 0.026, kRed), Vector3d::Zero(),
                  0, SceneMaterial::kGuide)};
 }
 

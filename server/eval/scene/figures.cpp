@@ -59,7 +59,8 @@ class Studio {
         SceneRenderer::Create(studio->room_.scene, studio->lens_.view(), GlBackend::kOsmesa);
     if (!renderer.ok()) return renderer.status();
     studio->renderer_ = *std::move(renderer);
-    auto view = SceneView::Create(studio->camera_, GlBackend::kOsmesa, kDrawnPerPixel);
+    auto view = SceneView::Create(studio->camera_, GlBackend::kOsmesa,
+                                  EnoughSupersampling(studio->camera_));
     if (!view.ok()) return view.status();
     studio->view_ = *std::move(view);
     MarkerOptions options;
@@ -141,7 +142,7 @@ class Studio {
   std::unique_ptr<MarkerDetector> detector_;
 };
 
-const Vector3d kEye(2.15, -1.55, -3.3), kAim(1.15, -1.0, -0.2);
+const Vector3d kEye(2.2, -1.6, -3.7), kAim(1.2, -0.95, -0.2);
 const Vector3d kRight(2.2, -1.0, -0.2);  // to the door, squares at the left
 
 }  // namespace
@@ -167,13 +168,13 @@ absl::StatusOr<std::vector<FigureResult>> RunFigures(const std::filesystem::path
       {"2-partial-cover.jpg", covered->get(), kEye + Vector3d(-0.2, 0.05, 0), kAim, *behind},
       {"3-divider-grid.jpg", plain->get(), kEye + Vector3d(0.1, -0.1, 0), kAim, DividerAndGrid()},
       {"4-hidden-wires.jpg", plain->get(), kEye, kAim + Vector3d(0.2, -0.1, 0), HiddenWires()},
-      {"5-escape-route.jpg", plain->get(), kEye, kRight + Vector3d(-0.1, 0.2, 0), EscapeRoute()},
-      {"6-red-arrow.jpg", plain->get(), kEye + Vector3d(-0.1, 0.1, 0.5),
+      {"5-escape-route.jpg", plain->get(), kEye, kRight + Vector3d(-0.1, 0.0, 0), EscapeRoute()},
+      {"6-red-arrow.jpg", plain->get(), kEye + Vector3d(-0.1, 0.1, 0.8),
        kAim + Vector3d(0.3, -0.2, 0), RedArrow()},
-      {"7-hose-in-cabinet.jpg", plain->get(), kEye + Vector3d(-0.1, 0, 0.6),
+      {"7-hose-in-cabinet.jpg", plain->get(), kEye + Vector3d(-0.1, 0, 1.0),
        kRight + Vector3d(-0.35, -0.1, 0), HoseInCabinet()},
       {"8-floor-grid.jpg", plain->get(), kEye + Vector3d(0.1, -0.2, 0),
-       kAim + Vector3d(0.1, 0.3, 0), GridAndPerson()}};
+       kAim + Vector3d(0.1, 0.05, 0), GridAndPerson()}};
   std::vector<FigureResult> results;
   for (const Figure& figure : figures) {
     const auto one =

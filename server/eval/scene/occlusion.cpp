@@ -22,7 +22,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDrawnPerPixel = 2.0;  // as the server draws (SceneLayer)
 constexpr int kShownPictures = 8;
 constexpr std::int64_t kLeastPixels = 2000;
 
@@ -233,8 +232,8 @@ absl::StatusOr<OcclusionSummary> RunOcclusion(std::uint64_t seed, int count,
   absl::StatusOr<std::unique_ptr<SimSource>> source =
       SimSource::OpenUri(absl::StrCat("desk?motion=walk&seed=", seed), {});
   if (!source.ok()) return source.status();
-  absl::StatusOr<std::unique_ptr<SceneView>> view =
-      SceneView::Create((*source)->true_camera(), GlBackend::kOsmesa, kDrawnPerPixel);
+  absl::StatusOr<std::unique_ptr<SceneView>> view = SceneView::Create(
+      (*source)->true_camera(), GlBackend::kOsmesa, EnoughSupersampling((*source)->true_camera()));
   if (!view.ok()) return view.status();
   PlacedMesh room;
   room.mesh = std::make_shared<TriangleMesh>(RoomMeshOf(BuildRoom(seed)));
