@@ -10,9 +10,6 @@
 namespace saccade {
 namespace {
 
-// The edges of what hides: finer than the picture's own pixels, which the lens cuts anew.
-constexpr double kDrawnPerPixel = 2.0;
-
 bool SameLens(const CameraIntrinsics& a, const CameraIntrinsics& b) {
   return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
          a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion;
@@ -42,7 +39,7 @@ cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
   if (view_ == nullptr || !SameLens(intrinsics_, camera.intrinsics())) {
     revision_ = 0;
     absl::StatusOr<std::unique_ptr<SceneView>> made =
-        SceneView::Create(camera, backend_, kDrawnPerPixel);
+        SceneView::Create(camera, backend_, EnoughSupersampling(camera));
     if (!made.ok()) return give_up(made.status());
     view_ = *std::move(made);
     intrinsics_ = camera.intrinsics();

@@ -140,6 +140,8 @@ absl::Status CalibrateTargetCommand(const CalibrateTargetArguments& arguments);
 absl::Status PlacementsCommand(const PlacementsArguments& arguments);
 /// Holds what hides virtual things against rays cast into the simulated room (T33).
 absl::Status OcclusionCommand(const PlacementsArguments& arguments);
+/// Remakes figures 6 and 7 of Koller et al. (VRST 1997): eight pictures, JPEG.
+absl::Status FiguresCommand(const std::filesystem::path& out);
 /// Whether the source is paced by the world, and ends when somebody ends it.
 bool IsLive(absl::string_view uri);
 /// InvalidArgument with the remedy: `uri` is a phone's, which only a server receives.

@@ -283,6 +283,12 @@ void AddOcclusion(CLI::App& app, PlacementsArguments& arguments) {
       ->required();
 }
 
+void AddFigures(CLI::App& app, std::filesystem::path& out) {
+  CLI::App* figures =
+      app.add_subcommand("figures", "Remake figures 6 and 7 of Koller et al. (1997)");
+  figures->add_option("--out", out, "Folder for the pictures")->required();
+}
+
 /// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell
 /// starts what is in the background deaf to SIGINT, and a mask of blocked signals is inherited.
 void HearSignals() {
@@ -349,6 +355,8 @@ int Main(int argc, char** argv) {
   AddPlacements(app, placements);
   AddOcclusion(app, occlusion);
   AddTeam(app, team);
+  std::filesystem::path figures;
+  AddFigures(app, figures);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -369,6 +377,7 @@ int Main(int argc, char** argv) {
   }
   if (app.got_subcommand("calibrate")) status = CalibrateTargetCommand(target);
   if (app.got_subcommand("placements")) status = PlacementsCommand(placements);
+  if (app.got_subcommand("figures")) status = FiguresCommand(figures);
   if (app.got_subcommand("occlusion")) status = OcclusionCommand(occlusion);
   if (app.got_subcommand("team")) status = TeamCommand(team);
   return status.ok() ? 0 : Fail(status);

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <vector>
 
+#include "server/markers/koller_edges.hpp"
+#include "server/markers/square_sampler.hpp"
+
 namespace saccade {
 namespace {
 
@@ -33,24 +36,9 @@ struct Bounds {
   double pitch_px, most_black, least_red;
 };
 constexpr Bounds kSmall = {3.0, 0.42, 0.50}, kLarge = {7.0, 0.17, 0.27};
-
-struct Homography {
-  explicit Homography(const std::array<Point, 4>& corners) {
-    // Unit square, clockwise from (0, 0), to the corners.
-    const Point sum = corners[0] - corners[1] + corners[2] - corners[3];
-    const Point a = corners[1] - corners[2], b = corners[3] - corners[2];
-    const double scale = a.x() * b.y() - b.x() * a.y();
-    const double g = (sum.x() * b.y() - b.x() * sum.y()) / scale;
-    const double h = (a.x() * sum.y() - sum.x() * a.y()) / scale;
-    matrix.col(0) << corners[1] * (1 + g) - corners[0], g;
-    matrix.col(1) << corners[3] * (1 + h) - corners[0], h;
-    matrix.col(2) << corners[0], 1;
-  }
-  Point operator()(double u, double v) const {
-    return (matrix * Eigen::Vector3d(u, v, 1)).hnormalized();
-  }
-  Eigen::Matrix3d matrix;
-};
+// Edges of red cells, in cells: the worst, and of all. An edge of shadow within a cell moves its
+// edges by 0.2 at most; a side that is something else's lets the whole code slip by 0.25 or more.
+constexpr double kMostEdgeOff = 0.24, kMostEdgesOff = 0.13;
 
 struct Band {
   double u, v;  // where along the frame
@@ -59,17 +47,10 @@ struct Band {
   bool clear() const { return outer[1] - inner[1] >= kLeastCellContrast; }
 };
 
-double Redness(const Color& color) { return color[2] - std::max(color[0], color[1]); }
-
 class Reader {
  public:
   Reader(const cv::Mat& color, const std::array<Point, 4>& corners)
-      : color_(color), place_(corners) {
-    side_px_ = 1e9;
-    for (int k = 0; k < 4; ++k) {
-      side_px_ = std::min(side_px_, (corners[(k + 1) % 4] - corners[k]).norm());
-    }
-  }
+      : square_(color, corners), side_px_(square_.side_px()) {}
 
   absl::StatusOr<KollerReading> Read() {
     if (!MeasureFrame()) return absl::InvalidArgumentError("its frame is not black on white");
@@ -94,23 +75,16 @@ class Reader {
       if (!is_red.ok()) return is_red.status();
       red[k] = *is_red;
     }
-    return ReadKollerCells(red);
+    absl::StatusOr<KollerReading> reading = ReadKollerCells(red);
+    if (reading.ok() && !EdgesAgree(red)) {
+      return absl::InvalidArgumentError(
+          "its red cells do not end where they must; something lies over it, or it is no square");
+    }
+    return reading;
   }
 
  private:
-  Color At(double u, double v) const {
-    const Point p = place_(u, v);
-    const double x = std::clamp(p.x(), 0.0, color_.cols - 1.001);
-    const double y = std::clamp(p.y(), 0.0, color_.rows - 1.001);
-    const int left = static_cast<int>(x), top = static_cast<int>(y);
-    const double a = x - left, b = y - top;
-    const auto value = [&](int row, int column) {
-      const auto& pixel = color_.at<cv::Vec3b>(row, column);
-      return Color(pixel[0], pixel[1], pixel[2]);
-    };
-    return (1 - b) * ((1 - a) * value(top, left) + a * value(top, left + 1)) +
-           b * ((1 - a) * value(top + 1, left) + a * value(top + 1, left + 1));
-  }
+  Color At(double u, double v) const { return square_.At(u, v); }
 
   /// Three places a side, each over the middle of a cell.
   bool MeasureFrame() {
@@ -237,9 +211,17 @@ class Reader {
     return red;
   }
 
-  const cv::Mat& color_;
-  Homography place_;
-  double side_px_ = 0, contrast_ = 0;
+  bool EdgesAgree(const KollerCells& red) const {
+    std::array<double, 12> black;
+    for (int k = 0; k < 12; ++k) black[k] = Redness(bands_[k].inner);
+    std::nth_element(black.begin(), black.begin() + 6, black.end());
+    const KollerEdges edges = LookAtEdges(square_, red, black[6]);
+    return edges.worst_cells < kMostEdgeOff && edges.rms_cells < kMostEdgesOff;
+  }
+
+  const SquareSampler square_;
+  const double side_px_;
+  double contrast_ = 0;
   std::array<Band, 12> bands_{};
 };
 

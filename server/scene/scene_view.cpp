@@ -1,5 +1,7 @@
 #include "server/scene/scene_view.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "server/sim/lens.hpp"
@@ -8,6 +10,8 @@
 
 namespace saccade {
 namespace {
+
+constexpr double kMostSupersampling = 3.0, kMostDrawnPixels = 4.0 * 1280 * 720;
 
 /// Image v grows along window y, so that the first row read back is the top one.
 Eigen::Matrix4f ClipFromCamera(const PinholeView& view) {
@@ -104,6 +108,11 @@ void SceneView::SetLight(const SceneLight& light) {
 absl::StatusOr<cv::Mat> SceneView::Draw(const Rigid3& world_from_camera) {
   return impl_->thread.Submit([this, world_from_camera] { return impl_->Draw(world_from_camera); })
       .get();
+}
+
+double EnoughSupersampling(const CameraModel& camera) {
+  const double pixels = static_cast<double>(camera.width()) * camera.height();
+  return std::clamp(std::sqrt(kMostDrawnPixels / pixels), 1.0, kMostSupersampling);
 }
 
 void Blend(const cv::Mat& premultiplied_bgra, cv::Mat& bgr) {

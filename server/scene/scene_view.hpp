@@ -41,6 +41,10 @@ class SceneView {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Drawn pixels per camera pixel that edges of what hides need, the fewer the larger the picture
+/// is: 3 up to 640 x 480, 2 for 1280 x 720, never below 1.
+double EnoughSupersampling(const CameraModel& camera);
+
 /// Puts what SceneView drew over a picture of the same size, CV_8UC3.
 void Blend(const cv::Mat& premultiplied_bgra, cv::Mat& bgr);
 

@@ -11,6 +11,7 @@
 
 #include "server/eval/output_file.hpp"
 #include "server/eval/scene/random_room.hpp"
+#include "server/eval/scene/room_mesh.hpp"
 #include "server/scene/scene_view.hpp"
 #include "server/sim/room.hpp"
 #include "server/sim/sim_source.hpp"
@@ -21,27 +22,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kDrawnPerPixel = 2.0;  // as the server draws (SceneLayer)
 constexpr int kShownPictures = 8;
 constexpr std::int64_t kLeastPixels = 2000;
-
-/// The room's surfaces as a mesh, in world.
-TriangleMesh RoomMeshOf(const RoomScene& room) {
-  TriangleMesh mesh;
-  for (const SurfacePatch& patch : room.patches) {
-    const auto base = static_cast<std::uint32_t>(mesh.positions.size());
-    mesh.positions.insert(mesh.positions.end(), patch.positions.begin(), patch.positions.end());
-    const auto stride = static_cast<std::uint32_t>(patch.columns + 1);
-    for (std::uint32_t j = 0; j < static_cast<std::uint32_t>(patch.rows); ++j) {
-      for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(patch.columns); ++i) {
-        const std::uint32_t a = base + j * stride + i;
-        mesh.triangles.push_back({a, a + stride, a + 1});
-        mesh.triangles.push_back({a + 1, a + stride, a + stride + 1});
-      }
-    }
-  }
-  return mesh;
-}
 
 /// How far the first triangle is along a ray (Moeller and Trumbore 1997); infinite if there is
 /// none.
@@ -141,7 +123,7 @@ std::optional<PlacedMesh> RandomPlaced(const SimSource& source, std::uint64_t fr
   Append(thing.mesh, Rigid3(), scale, *scaled);
   placed.mesh = std::move(scaled);
   placed.world_from_mesh = {turn, middle - turn * (0.5 * scale * (low + high))};
-  placed.material = SceneMaterial::kVirtual;
+  placed.material = SceneMaterial::kGuide;  // as kVirtual, without a shadow, which is no part of it
   return placed;
 }
 
@@ -250,8 +232,8 @@ absl::StatusOr<OcclusionSummary> RunOcclusion(std::uint64_t seed, int count,
   absl::StatusOr<std::unique_ptr<SimSource>> source =
       SimSource::OpenUri(absl::StrCat("desk?motion=walk&seed=", seed), {});
   if (!source.ok()) return source.status();
-  absl::StatusOr<std::unique_ptr<SceneView>> view =
-      SceneView::Create((*source)->true_camera(), GlBackend::kOsmesa, kDrawnPerPixel);
+  absl::StatusOr<std::unique_ptr<SceneView>> view = SceneView::Create(
+      (*source)->true_camera(), GlBackend::kOsmesa, EnoughSupersampling((*source)->true_camera()));
   if (!view.ok()) return view.status();
   PlacedMesh room;
   room.mesh = std::make_shared<TriangleMesh>(RoomMeshOf(BuildRoom(seed)));

@@ -8,6 +8,7 @@
 
 #include "server/capture/image_file.hpp"
 #include "server/markers/koller_code.hpp"
+#include "server/markers/koller_edges.hpp"
 #include "server/markers/marker_detector.hpp"
 #include "server/markers/marker_sheet.hpp"
 #include "server/markers/puddles.hpp"
@@ -49,6 +50,38 @@ TEST(KollerCode, AMirrorShowsAnotherCode) {
     KollerCells mirrored{};
     for (int k = 0; k < 9; ++k) mirrored[3 * (k / 3) + 2 - k % 3] = cells[k];
     EXPECT_EQ(ReadKollerCells(mirrored)->id, MirroredKollerId(id));
+  }
+}
+
+TEST(KollerEdges, AreWhereTheCodeSaysHoweverBlurredUnlessASideIsSomethingElses) {
+  constexpr int kSide = 80, kAt = 30;
+  const cv::Scalar black(25, 25, 25), red(38, 36, 200);
+  for (const int id : {0, 6, 15}) {
+    cv::Mat sharp(140, 140, CV_8UC3, cv::Scalar(220, 222, 225));
+    sharp(cv::Rect(kAt, kAt, kSide, kSide)).setTo(black);
+    const KollerCells cells = KollerCellsOf(id);
+    for (int k = 0; k < 9; ++k) {
+      const cv::Rect cell(kAt + 10 + 20 * (k % 3), kAt + 10 + 20 * (k / 3), 20, 20);
+      if (cells[k]) sharp(cell).setTo(red);
+    }
+    const double low = kAt - 0.5, high = low + kSide;
+    const std::array<Eigen::Vector2d, 4> whole = {
+        {{low, low}, {high, low}, {high, high}, {low, high}}};
+    for (const double blur_px : {0.4, 2.0, 5.0}) {
+      cv::Mat picture;
+      cv::GaussianBlur(sharp, picture, {}, blur_px);
+      const SquareSampler square(picture, whole);
+      EXPECT_LT(LookAtEdges(square, cells, 0).worst_cells, 0.06) << id << " " << blur_px;
+      if (id != 0) continue;  // of one cell: what a stack of cartons before a square looks like
+      for (int side = 0; side < 4; ++side) {
+        std::array<Eigen::Vector2d, 4> moved = whole;
+        for (const int k : {side, (side + 1) % 4}) {
+          moved[k] += 0.25 * (whole[(side + 3) % 4] - whole[side]);
+        }
+        EXPECT_GT(LookAtEdges({picture, moved}, cells, 0).worst_cells, 0.24)
+            << side << " " << blur_px;
+      }
+    }
   }
 }
 

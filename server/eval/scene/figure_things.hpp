@@ -1,0 +1,23 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <vector>
+
+#include "shared/render/placed_mesh.hpp"
+
+namespace saccade {
+
+// What is virtual in the figures, in FigureRoom's world. Furniture is placed by Place(): pushed
+// until it touches, lowered until it rests; its errors pass through.
+
+absl::StatusOr<std::vector<PlacedMesh>> PushedFurniture(const TriangleMesh& room);
+absl::StatusOr<std::vector<PlacedMesh>> FurnitureBehindCartons(const TriangleMesh& room);
+std::vector<PlacedMesh> DividerAndGrid();
+std::vector<PlacedMesh> HiddenWires();
+std::vector<PlacedMesh> EscapeRoute();
+std::vector<PlacedMesh> RedArrow();
+std::vector<PlacedMesh> HoseInCabinet();
+std::vector<PlacedMesh> GridAndPerson();
+
+}  // namespace saccade
