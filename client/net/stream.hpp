@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client/net/connection.hpp"
+#include "client/net/scene_types.hpp"
 #include "client/net/types.hpp"
 #include "shared/audio/voice_frame.hpp"
 
@@ -81,7 +82,7 @@ struct VoiceNews {
 
 using StreamEvent = std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange,
                                  GazeSnapshot, Statistics, Presence, std::vector<PointerNews>,
-                                 std::vector<ChatMessage>, PicturePause, VoiceNews, SourceEnd>;
+                                 std::vector<ChatMessage>, PicturePause, SceneChange, VoiceNews, SourceEnd>;
 
 /// Times of one Ping [ns]: `sent` and `answered` on this machine's clock, the others on the
 /// server's.
