@@ -20,7 +20,8 @@ absl::StatusOr<SceneChange> FromProto(const v1::SceneEvent& message) {
                      .full = message.full(),
                      .upserted = {},
                      .removed_ids = {message.removed_ids().begin(), message.removed_ids().end()},
-                     .added_models = {}};
+                     .added_models = {},
+                     .light = {}};
   for (int i = 0; i < message.upserted_size(); ++i) {
     absl::StatusOr<SceneObject> object =
         wire::FromProto(message.upserted(i), absl::StrCat("scene.upserted[", i, "]"));
@@ -32,6 +33,9 @@ absl::StatusOr<SceneChange> FromProto(const v1::SceneEvent& message) {
     if (!model.ok()) return model.status();
     change.added_models.push_back(*std::move(model));
   }
+  absl::StatusOr<SceneLight> light = wire::FromProto(message.light(), "scene.light");
+  if (!light.ok()) return light.status();
+  change.light = *light;
   return change;
 }
 

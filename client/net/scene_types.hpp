@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "shared/scene/scene_light.hpp"
 #include "shared/scene/scene_object.hpp"
 
 namespace saccade::net {
@@ -22,6 +23,7 @@ struct SceneChange {
   std::vector<SceneObject> upserted;
   std::vector<std::string> removed_ids;
   std::vector<ModelFacts> added_models;
+  SceneLight light;
 };
 
 }  // namespace saccade::net

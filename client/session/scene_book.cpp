@@ -6,6 +6,9 @@
 namespace saccade::session {
 
 void SceneBook::Apply(const net::SceneChange& change) {
+  light_ = change.light;
+  const bool light_alone = !change.full && change.revision == scene_.revision;
+  if (light_alone) return;
   std::vector<SceneObject>& objects = scene_.objects;
   if (change.full) objects.clear();  // models are what their ids say: they stay
   std::erase_if(objects, [&change](const SceneObject& one) {

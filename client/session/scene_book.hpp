@@ -15,11 +15,13 @@ class SceneBook {
   void Add(std::shared_ptr<const SceneModel> model);
 
   const Scene& scene() const { return scene_; }
-  /// Rises with every change.
+  const SceneLight& light() const { return light_; }
+  /// Rises with every change but the light's.
   std::uint64_t version() const { return version_; }
 
  private:
   Scene scene_;
+  SceneLight light_;
   std::uint64_t version_ = 0;
 };
 

@@ -36,7 +36,9 @@ absl::StatusOr<std::unique_ptr<DeskView>> DeskView::Create(const GlFunctions& gl
 void DeskView::Update() {
   const decode::Picture* picture = desk_.shown();
   scene_->Update(desk_.session());
-  things_->Update(desk_.session());
+  const auto markers = picture != nullptr ? std::span<const MarkerPose>(picture->facts->markers)
+                                          : std::span<const MarkerPose>();
+  things_->Update(desk_.session(), markers);
   if (picture == nullptr || desk_.picture_paused()) return scene_->Show(nullptr, nullptr);
   const cv::Mat& rgba = picture->rgba;
   if (rgba.data != on_card_) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "shared/models/shapes.hpp"
+#include "shared/scene/object_place.hpp"
 
 namespace saccade::view {
 namespace {
@@ -17,12 +18,13 @@ constexpr double kSupersampling = 1.0;
 constexpr std::array<int, 2> kColored = {3, 4};
 constexpr std::array<float, 4> kEdge = {0.545f, 0.565f, 0.592f, 1.0f};
 
-std::optional<Rigid3> WorldFromObject(const SceneObject& object, const session::State& state) {
-  if (object.parent == SceneParent::kWorld) return object.parent_from_object;
-  const Annotation* mark = state.annotations.Find(object.annotation_id);
-  if (mark == nullptr || !mark->anchor.place_known) return std::nullopt;
-  return Rigid3{Eigen::Quaterniond::Identity(), mark->anchor.point_in_world} *
-         object.parent_from_object;
+bool SamePlaces(const std::vector<std::optional<Rigid3>>& a,
+                const std::vector<std::optional<Rigid3>>& b) {
+  return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
+    if (!one || !other) return one.has_value() == other.has_value();
+    return one->translation == other->translation &&
+           one->rotation.coeffs() == other->rotation.coeffs();
+  });
 }
 
 /// The twelve edges of a box on its base, the four of a plane.
@@ -57,27 +59,32 @@ absl::StatusOr<std::unique_ptr<ThingLayer>> ThingLayer::Create(const GlFunctions
   return made;
 }
 
-bool ThingLayer::Update(const session::State& state) {
-  std::vector<Eigen::Vector3d> places;
-  for (const SceneObject& object : state.scene.scene().objects) {
-    if (object.parent == SceneParent::kWorld) continue;
-    const std::optional<Rigid3> pose = WorldFromObject(object, state);
-    places.push_back(pose ? pose->translation : Eigen::Vector3d::Constant(1e9));
+void ThingLayer::Update(const session::State& state, std::span<const MarkerPose> markers) {
+  video_->SetLight(state.scene.light());
+  map_->SetLight(state.scene.light());
+  const std::vector<SceneObject>& objects = state.scene.scene().objects;
+  const bool moves = std::ranges::any_of(
+      objects, [](const SceneObject& one) { return one.parent != SceneParent::kWorld; });
+  std::vector<std::optional<Rigid3>> places;
+  if (moves || state.scene.version() != version_) {
+    const std::vector<Annotation> marks = state.annotations.List();
+    for (const SceneObject& object : objects) {
+      places.push_back(WorldFromObject(object, marks, markers));
+    }
   }
-  if (state.scene.version() == version_ && places == places_) return false;
+  if (state.scene.version() == version_ && (!moves || SamePlaces(places, places_))) return;
   version_ = state.scene.version();
   places_ = std::move(places);
-  Upload(state);
-  return true;
+  Upload(state.scene.scene());
 }
 
-void ThingLayer::Upload(const session::State& state) {
-  const Scene& scene = state.scene.scene();
+void ThingLayer::Upload(const Scene& scene) {
   std::vector<PlacedMesh> all, outside;
   std::vector<float> vertices;
   std::vector<std::uint32_t> indices;
-  for (const SceneObject& object : scene.objects) {
-    const std::optional<Rigid3> pose = WorldFromObject(object, state);
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const SceneObject& object = scene.objects[i];
+    const std::optional<Rigid3>& pose = places_[i];
     if (!pose) continue;
     const std::shared_ptr<const SceneModel> model = scene.Model(object.model);
     const PlacedMesh mesh{std::make_shared<const TriangleMesh>(MeshOf(object, model.get())), *pose,
@@ -139,6 +146,7 @@ void ThingLayer::DrawVideo(const tools::View& view, float left, float top, float
   const auto page = [&](int u, int v) {
     return ImVec2(left + scale * static_cast<float>(u), top + scale * static_cast<float>(v));
   };
+  list->AddCallback(&ThingLayer::BlendPremultiplied, this);
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       const int u0 = edge(column, width), u1 = edge(column + 1, width);
@@ -158,6 +166,12 @@ void ThingLayer::DrawVideo(const tools::View& view, float left, float top, float
                          uv[2], uv[3]);
     }
   }
+  list->AddCallback(ImDrawCallback_ResetRenderState, nullptr);
+}
+
+void ThingLayer::BlendPremultiplied(const ImDrawList* /*list*/, const ImDrawCmd* command) {
+  static_cast<ThingLayer*>(command->UserCallbackData)
+      ->gl_.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
 }
 
 }  // namespace saccade::view

@@ -4,6 +4,8 @@
 #include <imgui.h>
 
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,8 +25,9 @@ class ThingLayer {
  public:
   static absl::StatusOr<std::unique_ptr<ThingLayer>> Create(const GlFunctions& gl);
 
-  /// Takes over what changed; true if anything did.
-  bool Update(const session::State& state);
+  /// Takes over what changed. `markers`: where those are that things are fixed to, in the picture
+  /// that is shown.
+  void Update(const session::State& state, std::span<const MarkerPose> markers);
 
   /// Adds what is seen from `view` to `list`, whose picture's pixel (0, 0) has its corner at
   /// `left`, `top`. Draws off screen at once; the window's framebuffer is bound again after.
@@ -39,14 +42,15 @@ class ThingLayer {
 
  private:
   explicit ThingLayer(const GlFunctions& gl);
-  void Upload(const session::State& state);
+  void Upload(const Scene& scene);
   absl::Status DrawOffScreen(const tools::View& view);
+  static void BlendPremultiplied(const ImDrawList* list, const ImDrawCmd* command);
 
   const GlFunctions& gl_;
   std::unique_ptr<ScenePainter> video_, map_;
   Mesh edges_;
   std::uint64_t version_ = 0;
-  std::vector<Eigen::Vector3d> places_;  // of annotations that things move with
+  std::vector<std::optional<Rigid3>> places_;  // of the objects; nothing: nobody knows
   std::shared_ptr<const CameraModel> lens_;
   std::unique_ptr<ScenePicture> picture_;
   std::unique_ptr<Texture> texture_;

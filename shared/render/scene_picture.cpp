@@ -1,6 +1,5 @@
 #include "shared/render/scene_picture.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace saccade {
@@ -8,17 +7,6 @@ namespace {
 
 constexpr double kBorder_px = 2;        // beyond the last one needed
 constexpr double kLeastForward = 0.05;  // of a bearing: beyond, a pinhole shows nothing
-
-/// Colours as they are where something is seen; the bytes hold them times alpha.
-void Unmultiply(std::span<std::uint8_t> bgra) {
-  for (std::size_t i = 0; i + 3 < bgra.size(); i += 4) {
-    const int alpha = bgra[i + 3];
-    if (alpha == 0 || alpha == 255) continue;
-    for (std::size_t k = i; k < i + 3; ++k) {
-      bgra[k] = static_cast<std::uint8_t>(std::min(255, (bgra[k] * 255 + alpha / 2) / alpha));
-    }
-  }
-}
 
 }  // namespace
 
@@ -67,7 +55,6 @@ absl::StatusOr<std::span<const std::uint8_t>> ScenePicture::Draw(ScenePainter& p
   clip(3, 2) = 1;
   painter.Draw(clip.cast<float>(), world_from_camera);
   if (absl::Status read = target_->ReadBgra(pixels_); !read.ok()) return read;
-  Unmultiply(pixels_);
   return std::span<const std::uint8_t>(pixels_);
 }
 

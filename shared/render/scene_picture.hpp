@@ -28,8 +28,8 @@ class ScenePicture {
                                                               const CameraModel& camera,
                                                               double supersampling);
 
-  /// Draws into a framebuffer of its own, which stays bound. B G R A, not premultiplied, alpha 0
-  /// where nothing virtual is seen; the top row first; until the next call.
+  /// Draws into a framebuffer of its own, which stays bound. B G R A, premultiplied, alpha 0 where
+  /// nothing virtual is seen; the top row first; until the next call.
   absl::StatusOr<std::span<const std::uint8_t>> Draw(ScenePainter& painter,
                                                      const Rigid3& world_from_camera);
   int width() const { return target_->width(); }

@@ -17,6 +17,8 @@
 namespace saccade {
 namespace {
 
+constexpr std::uint8_t kShadow = 200;  // alpha: shadows have less
+
 /// An upright box, unturned, by the rules of a ray and its slabs: shares no code with what draws.
 struct Box {
   Eigen::Vector3d base_in_world, size_m;
@@ -97,7 +99,7 @@ TEST(ScenePicture, ShowsThroughTheLensWhatRaysMeetFirst) {
       const int x = static_cast<int>(share->x() * (*picture)->width());
       const int y = static_cast<int>(share->y() * (*picture)->height());
       const bool shown =
-          (*drawn)[static_cast<std::size_t>(4 * (y * (*picture)->width() + x) + 3)] > 0;
+          (*drawn)[static_cast<std::size_t>(4 * (y * (*picture)->width() + x) + 3)] > kShadow;
       both_seen += seen && shown ? 1 : 0;
       either_seen += seen || shown ? 1 : 0;
       const bool hidden = meant && !seen, not_shown = meant && !shown;
