@@ -21,7 +21,7 @@ constexpr int kMostUnseen = 3;
 constexpr std::size_t kMostRemembered = 100;  // frames
 constexpr double kForget_s = 1.0;             // of velocity, and of which reading is which
 /// Of where a corner is expected, tried in turn: a wide search meets the code's own edges.
-constexpr std::array<double, 2> kSpreads_px = {1.5, 4.0};
+constexpr std::array<double, 3> kSpreads_px = {0.8, 1.5, 4.0};
 constexpr double kBorder_px = 4.0;
 constexpr double kShortest_px = 12.0;  // side that is searched
 constexpr double kStray_px = 3.0;      // from where the detector saw it: what is followed is not it
