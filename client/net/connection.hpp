@@ -104,6 +104,8 @@ class Connection {
   absl::StatusOr<Annotation> TickCheckItem(const std::string& id, std::uint32_t index, bool done);
   /// The file that a picture was made of.
   absl::StatusOr<Picture> GetPicture(const std::string& id);
+  /// The GLB file of a model of the scene, `bytes` long.
+  absl::StatusOr<std::string> GetModel(const std::string& id, std::uint32_t bytes);
   /// What was undone or redone, in words. Acts on the person's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();

@@ -17,6 +17,7 @@
 #include "saccade/v1/gaze.grpc.pb.h"
 #include "saccade/v1/map.grpc.pb.h"
 #include "saccade/v1/pointer.grpc.pb.h"
+#include "saccade/v1/scene.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 #include "saccade/v1/talk.grpc.pb.h"
 
@@ -36,6 +37,7 @@ class Connection::Impl {
         annotation_(v1::AnnotationService::NewStub(channel_)),
         gaze_(v1::GazeService::NewStub(channel_)),
         pointer_(v1::PointerService::NewStub(channel_)),
+        scene_(v1::SceneService::NewStub(channel_)),
         talk_(v1::TalkService::NewStub(channel_)) {}
 
   // One unary call with this connection's deadline.
@@ -126,6 +128,7 @@ class Connection::Impl {
   const std::unique_ptr<v1::AnnotationService::Stub> annotation_;
   const std::unique_ptr<v1::GazeService::Stub> gaze_;
   const std::unique_ptr<v1::PointerService::Stub> pointer_;
+  const std::unique_ptr<v1::SceneService::Stub> scene_;
   const std::unique_ptr<v1::TalkService::Stub> talk_;
 };
 

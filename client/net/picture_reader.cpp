@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "shared/wire/from_proto.hpp"
+#include "shared/wire/scene.hpp"
 
 namespace saccade::net {
 namespace {
@@ -67,6 +68,11 @@ absl::StatusOr<CodedPicture> PictureReader::Read(const v1::AccessUnit& unit, Tim
                                                      ", the picture is ", facts->frame_id));
     }
     facts->pose = *std::move(pose);
+    for (const v1::MarkerPose& message : unit.pose().markers()) {
+      absl::StatusOr<MarkerPose> marker = wire::FromProto(message, "access_unit.pose.markers");
+      if (!marker.ok()) return marker.status();
+      facts->markers.push_back(*std::move(marker));
+    }
   }
   if (unit.has_features()) {
     absl::StatusOr<SeenFeatures> seen = FromProto(unit.features());

@@ -7,6 +7,7 @@
 
 #include "client/net/channel.hpp"
 #include "client/net/convert.hpp"
+#include "client/net/scene_convert.hpp"
 #include "saccade/v1/scene.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 #include "shared/wire/from_proto.hpp"
@@ -17,12 +18,6 @@ namespace saccade::net {
 namespace {
 
 constexpr std::size_t kPiece = 200 * 1024;
-
-absl::StatusOr<ModelFacts> FromProto(const v1::SceneModelFacts& message) {
-  absl::StatusOr<Eigen::Vector3d> size = wire::FromProto(message.size_m(), "size_m");
-  if (!size.ok()) return size.status();
-  return ModelFacts{message.id(), message.name(), message.triangles(), message.bytes(), *size};
-}
 
 absl::StatusOr<Touch> FromProto(const v1::SceneContact& message) {
   absl::StatusOr<Eigen::Vector3d> point =

@@ -12,15 +12,11 @@
 #include <vector>
 
 #include "client/net/connection.hpp"
+#include "client/net/scene_types.hpp"
 #include "shared/scene/scene_object.hpp"
 
 namespace saccade::net {
 
-struct ModelFacts {
-  std::string id, name;
-  std::uint32_t triangles = 0, bytes = 0;
-  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();
-};
 struct SceneList {
   std::uint64_t revision = 0;
   std::vector<SceneObject> objects;

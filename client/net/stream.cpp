@@ -11,6 +11,7 @@
 #include "client/net/channel.hpp"
 #include "client/net/convert.hpp"
 #include "client/net/picture_reader.hpp"
+#include "client/net/scene_convert.hpp"
 #include "saccade/v1/session.grpc.pb.h"
 #include "saccade/v1/talk.grpc.pb.h"
 #include "shared/wire/from_proto.hpp"
@@ -99,7 +100,7 @@ class Stream::Impl {
     for (const v1::Topic topic :
          {v1::TOPIC_POSE, v1::TOPIC_MAP, v1::TOPIC_VIDEO, v1::TOPIC_ANNOTATION, v1::TOPIC_GAZE,
           v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS, v1::TOPIC_POINTER, v1::TOPIC_CHAT,
-          v1::TOPIC_PICTURE_PAUSE}) {
+          v1::TOPIC_PICTURE_PAUSE, v1::TOPIC_SCENE}) {
       request.add_topics(topic);
     }
     if (voice_) request.add_topics(v1::TOPIC_VOICE);
@@ -171,6 +172,8 @@ class Stream::Impl {
         return std::optional<StreamEvent>(FromProto(message.voice()));
       case v1::Event::kPicturePause:
         return std::optional<StreamEvent>(net::FromProto(message.picture_pause()));
+      case v1::Event::kScene:
+        return Wrap(net::FromProto(message.scene()));
       case v1::Event::kStatistics:
         return std::optional<StreamEvent>(net::FromProto(message.statistics()));
       case v1::Event::kPresence:

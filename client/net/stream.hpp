@@ -11,8 +11,10 @@
 #include <vector>
 
 #include "client/net/connection.hpp"
+#include "client/net/scene_types.hpp"
 #include "client/net/types.hpp"
 #include "shared/audio/voice_frame.hpp"
+#include "shared/scene/marker_pose.hpp"
 
 namespace saccade::net {
 
@@ -38,6 +40,7 @@ struct FrameFacts {
   std::shared_ptr<const CameraModel> camera;  // of the picture as coded
   std::optional<MapSnapshot> pose;            // without features
   std::optional<SeenFeatures> features;       // nothing: the server did not say
+  std::vector<MarkerPose> markers;            // that move, with things of the scene on them
   StageStamps stages;
   Timestamp arrived_ns = 0;  // MonotonicNow() of this machine
 };
@@ -79,9 +82,10 @@ struct VoiceNews {
   std::vector<VoicePacket> packets;
 };
 
-using StreamEvent = std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange,
-                                 GazeSnapshot, Statistics, Presence, std::vector<PointerNews>,
-                                 std::vector<ChatMessage>, PicturePause, VoiceNews, SourceEnd>;
+using StreamEvent =
+    std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange, GazeSnapshot, Statistics,
+                 Presence, std::vector<PointerNews>, std::vector<ChatMessage>, PicturePause,
+                 SceneChange, VoiceNews, SourceEnd>;
 
 /// Times of one Ping [ns]: `sent` and `answered` on this machine's clock, the others on the
 /// server's.

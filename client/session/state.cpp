@@ -50,6 +50,8 @@ void State::Apply(const net::StreamEvent& event, Timestamp now_ns) {
           chat.Add(value);
         } else if constexpr (std::is_same_v<T, net::PicturePause>) {
           pause = value.paused ? std::optional(value) : std::nullopt;
+        } else if constexpr (std::is_same_v<T, net::SceneChange>) {
+          scene.Apply(value);
         } else if constexpr (std::is_same_v<T, net::SourceEnd>) {
           source_ended = true;
         }

@@ -10,6 +10,7 @@
 #include "client/session/chat_book.hpp"
 #include "client/session/clock.hpp"
 #include "client/session/pointer_book.hpp"
+#include "client/session/scene_book.hpp"
 
 namespace saccade::session {
 
@@ -54,6 +55,7 @@ class State {
   ChatBook chat;
   PointerBook pointers;
   AnnotationBook annotations;
+  SceneBook scene;
   ClockOffset clock;
   // The map; `map_version` rises with every change of it.
   std::map<FeatureId, FeatureSnapshot> features;

@@ -7,6 +7,8 @@
 #include <chrono>
 #include <utility>
 
+#include "shared/models/gltf_reader.hpp"
+
 namespace saccade::session {
 namespace {
 
@@ -157,6 +159,9 @@ absl::Status Session::Threads::RunOnce(std::stop_token stop, bool& was_live) {
     } else if (event && std::holds_alternative<net::VoiceNews>(*event)) {
       if (options_.on_voice) options_.on_voice(std::get<net::VoiceNews>(*event));
     } else if (event) {
+      if (const auto* scene = std::get_if<net::SceneChange>(&*event)) {
+        AskForModels(scene->added_models);
+      }
       Post([event = *std::move(event), now_ns](State& state) { state.Apply(event, now_ns); });
     }
     const std::lock_guard lock(mutex_);
@@ -220,6 +225,27 @@ void Session::Threads::AskForHistory() {
   Ask([](net::Connection& connection) -> Answer {
     return [kept = connection.Messages()](State& state) {
       if (kept.ok()) state.chat.History(*kept);  // what breaks it breaks the stream as well
+    };
+  }).IgnoreError();
+}
+
+void Session::Threads::AskForModels(const std::vector<net::ModelFacts>& models) {
+  if (models.empty()) return;
+  Ask([this, models](net::Connection& connection) -> Answer {
+    std::vector<std::shared_ptr<const SceneModel>> read;
+    for (const net::ModelFacts& facts : models) {
+      if (models_.contains(facts.id)) continue;
+      absl::StatusOr<std::string> file = connection.GetModel(facts.id, facts.bytes);
+      if (!file.ok()) break;  // what breaks it breaks the stream as well, which then tells anew
+      absl::StatusOr<TriangleMesh> mesh = ReadGlb(*file);
+      if (!mesh.ok()) continue;  // the server has read it: another version's file, not drawn
+      models_.insert(facts.id);
+      read.push_back(std::make_shared<const SceneModel>(
+          SceneModel{facts.id, facts.name, *std::move(mesh),
+                     std::make_shared<const std::string>(*std::move(file))}));
+    }
+    return [read](State& state) {
+      for (const auto& model : read) state.scene.Add(model);
     };
   }).IgnoreError();
 }

@@ -4,6 +4,7 @@
 #include <deque>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <thread>
 #include <vector>
@@ -37,6 +38,8 @@ class Session::Threads {
   void AskForHistory();
   /// True once after Listen() ended the stream.
   bool Renewed();
+  /// The files of those that are not here yet.
+  void AskForModels(const std::vector<net::ModelFacts>& models);
   void Post(Answer answer);
   void SetLink(Link::Kind kind, std::string reason = "");
   bool SleepFor(std::stop_token stop, std::chrono::milliseconds time);
@@ -53,6 +56,7 @@ class Session::Threads {
   std::shared_ptr<net::Stream> stream_;            // the one that is read
   std::optional<Acknowledger> acknowledger_;
   Timestamp heard_ns_ = 0, pinged_ns_ = 0;
+  std::set<std::string> models_;  // fetched; the thread of edits
   std::string ended_;  // why we ended the stream ourselves
   bool listens_ = false;
   bool renewed_ = false;  // the stream was ended to ask for something else

@@ -27,12 +27,18 @@ absl::StatusOr<std::unique_ptr<DeskView>> DeskView::Create(const GlFunctions& gl
   auto scene = MapScene::Create(gl);
   if (!scene.ok()) return scene.status();
   view->scene_ = *std::move(scene);
+  auto things = ThingLayer::Create(gl);
+  if (!things.ok()) return things.status();
+  view->things_ = *std::move(things);
   return view;
 }
 
 void DeskView::Update() {
   const decode::Picture* picture = desk_.shown();
   scene_->Update(desk_.session());
+  const auto markers = picture != nullptr ? std::span<const MarkerPose>(picture->facts->markers)
+                                          : std::span<const MarkerPose>();
+  things_->Update(desk_.session(), markers);
   if (picture == nullptr || desk_.picture_paused()) return scene_->Show(nullptr, nullptr);
   const cv::Mat& rgba = picture->rgba;
   if (rgba.data != on_card_) {
@@ -99,6 +105,9 @@ std::string DeskView::Note(Pane pane, Timestamp now_ns) const {
                                            "were");
   }
   if (told.pause) return tools::PauseWords(*told.pause);
+  if (!things_->problem().empty()) {
+    return absl::StrCat("The scene is not drawn: ", things_->problem());
+  }
   if (!desk_.live())
     return told.link.live() ? "waiting for the first picture" : "no picture: not connected";
   const Timestamp age = now_ns - desk_.live()->decoded_ns;
@@ -143,7 +152,7 @@ Marks DeskView::MarksIn(const tools::View& view) const {
 void DeskView::OnMap(const ImDrawList* /*list*/, const ImDrawCmd* command) {
   auto* self = static_cast<DeskView*>(command->UserCallbackData);
   self->scene_->Draw(self->eye_, self->viewport_, kFrustumShare * self->desk_.orbit().distance_m(),
-                     self->point_px_);
+                     self->point_px_, *self->things_);
 }
 
 void DeskView::DrawMap(const Rect& rect, const Canvas& canvas, ImDrawList* list) {
@@ -186,6 +195,7 @@ void DeskView::DrawVideo(const Rect& rect, const Canvas& canvas, ImDrawList* lis
   list->AddImage(IdOf(*texture_), {inside.x, inside.y}, {inside.right(), inside.bottom()});
   const std::optional<tools::View> view = desk_.video_view();
   if (!view) return;
+  if (desk_.same_map()) things_->DrawVideo(*view, at.left, at.top, at.scale, list);
   Painter painter(list, inside, at.left, at.top, at.scale, canvas.scale);
   DrawFeatures(*picture->facts, *view, painter);
   if (!desk_.same_map()) return;

@@ -9,6 +9,7 @@
 #include "client/view/map_scene.hpp"
 #include "client/view/painter.hpp"
 #include "client/view/picture_layer.hpp"
+#include "client/view/thing_layer.hpp"
 #include "shared/render/texture.hpp"
 
 namespace saccade::view {
@@ -55,6 +56,7 @@ class DeskView {
   Desk& desk_;
   std::unique_ptr<MapScene> scene_;
   PictureLayer pictures_;
+  std::unique_ptr<ThingLayer> things_;
   std::unique_ptr<Texture> texture_;
   int texture_width_ = 0, texture_height_ = 0;
   const void* on_card_ = nullptr;  // the pixels that the texture has

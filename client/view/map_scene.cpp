@@ -186,7 +186,7 @@ void MapScene::BuildFrustum(const CameraModel& camera) {
 }
 
 void MapScene::Draw(const tools::View& eye, const Eigen::Vector4i& viewport, double frustum_m,
-                    float point_px) {
+                    float point_px, ThingLayer& things) {
   gl_.Viewport(viewport[0], viewport[1], viewport[2], viewport[3]);
   gl_.Scissor(viewport[0], viewport[1], viewport[2], viewport[3]);
   gl_.Enable(GL_SCISSOR_TEST);
@@ -200,18 +200,23 @@ void MapScene::Draw(const tools::View& eye, const Eigen::Vector4i& viewport, dou
   const ImVec4 ground = ImGui::ColorConvertU32ToFloat4(kGround);
   gl_.ClearColor(ground.x, ground.y, ground.z, 1);
   gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  const Eigen::Matrix4f clip_from_world =
-      ClipFromCamera(*eye.camera, 0.01, 1000) * MatrixOf(eye.camera_from_world);
+  const Eigen::Matrix4f clip_from_camera = ClipFromCamera(*eye.camera, 0.01, 1000);
+  const Eigen::Matrix4f clip_from_world = clip_from_camera * MatrixOf(eye.camera_from_world);
   plain_->Use();
   plain_->Set("clip_from_model", clip_from_world);
   plain_->Set("point_px", point_px);
   plain_->Set("round_points", 0);
   grid_.Draw(GL_LINES);
   path_.Draw(GL_LINE_STRIP);
+  things.edges().Draw(GL_LINES);
   sigmas_.Draw(GL_LINES);
   plain_->Set("round_points", 1);
   points_.Draw(GL_POINTS);
-  if (picture_ == nullptr) return;
+  if (picture_ != nullptr) DrawFrustum(clip_from_world, frustum_m);
+  things.DrawMap(clip_from_camera, eye.world_from_camera);
+}
+
+void MapScene::DrawFrustum(const Eigen::Matrix4f& clip_from_world, double frustum_m) {
   Eigen::Matrix4f model = MatrixOf(world_from_camera_);
   model.topLeftCorner<3, 3>() *= static_cast<float>(frustum_m);
   plain_->Set("round_points", 0);

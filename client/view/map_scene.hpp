@@ -8,6 +8,7 @@
 
 #include "client/session/state.hpp"
 #include "client/tools/view.hpp"
+#include "client/view/thing_layer.hpp"
 #include "shared/render/gl_functions.hpp"
 #include "shared/render/mesh.hpp"
 #include "shared/render/program.hpp"
@@ -28,14 +29,16 @@ class MapScene {
   void Show(const net::FrameFacts* facts, const Texture* picture);
 
   /// Draws into `viewport` (x, y from the bottom, width, height [framebuffer px]), clears it first.
-  /// `eye`: a pinhole's; `frustum_m`: how far the picture lies before the camera.
+  /// `eye`: a pinhole's; `frustum_m`: how far the picture lies before the camera. `things` come
+  /// last: known surfaces hide nothing of the map.
   void Draw(const tools::View& eye, const Eigen::Vector4i& viewport, double frustum_m,
-            float point_px);
+            float point_px, ThingLayer& things);
 
  private:
   explicit MapScene(const GlFunctions& gl);
   void BuildGrid();
   void BuildFrustum(const CameraModel& camera);
+  void DrawFrustum(const Eigen::Matrix4f& clip_from_world, double frustum_m);
 
   const GlFunctions& gl_;
   std::unique_ptr<Program> plain_, textured_;

@@ -56,6 +56,7 @@ Engine::Engine(EngineOptions options, std::unique_ptr<FrameSource> source, Event
       source_(std::move(source)),
       inbox_(options_.mailbox),
       clock_(/*paced=*/!options_.every_frame),
+      carried_(/*waits=*/options_.every_frame),
       scene_layer_(options_.gl),
       stills_({.capacity = kStillsWaiting, .when_full = WhenFull::kRefuse},
               [this](StillRequest request) { MakeStill(std::move(request)); }) {
@@ -182,13 +183,18 @@ void Engine::Track(Frame frame) {
   const Timestamp captured_ns = clock_.ToMonotonic(frame.capture_time_ns, frame.received_time_ns);
   pictures_->Note(frame.id, captured_ns);  // before the ring has it, and with it anybody
   wearable_->tracker().SetSight(scene_->sight());
+  wearable_->tracker().SetCarried(scene_->carried());
+  carried_.SetWanted(scene_->carried());
   const WearableStep& step = wearable_->Step(std::move(frame));
   TrackedFrame next{.frame = step.frame, .tracked = {}};
   TrackedEvent& tracked = next.tracked;
   tracked.camera = step.frame->camera;
   tracked.stages.captured_ns = captured_ns;
   tracked.stages.received_ns = step.frame->received_time_ns;
-  scene_layer_.SetLight(wearable_->tracker().light());
+  tracked.light = wearable_->tracker().light();
+  tracked.markers = carried_.Step(*step.frame, captured_ns, *step.snapshot);
+  scene_->SetMarkers(tracked.markers);
+  scene_layer_.SetLight(tracked.light);
   last_ = std::move(next);
   if (options_.calibration) options_.calibration->OnFrame(step.frame);
   for (const AnchorMoved& moved : step.moved) {

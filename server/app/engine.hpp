@@ -23,6 +23,7 @@
 #include "server/pipeline/inbox.hpp"
 #include "server/pipeline/rolling_statistics.hpp"
 #include "server/rpc/backend.hpp"
+#include "server/tracker/carried_squares.hpp"
 #include "server/wearable/wearable.hpp"
 
 namespace saccade {
@@ -140,6 +141,7 @@ class Engine : public Backend {
   std::optional<TrackedFrame> last_;
   std::shared_ptr<const MapSnapshot> published_snapshot_;
   Timestamp gap_told_ns_ = 0;  // MonotonicNow() of the last word on a gap
+  CarriedSquares carried_;
 
   RollingStatistics captured_, track_ms_;
   std::atomic<std::uint64_t> frames_ = 0, dropped_ = 0, source_dropped_ = 0, bad_frames_ = 0;

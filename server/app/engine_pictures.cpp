@@ -80,8 +80,11 @@ cv::Mat Engine::DrawAugmented(const TrackedFrame& frame, bool waits) const {
     overlay.pointers = pointers_;
   }
   overlay.scene = [this, &frame](const CameraModel& camera, const Rigid3& world_from_camera) {
-    return scene_layer_.Draw(*scene_->scene(), *frame.tracked.annotations, camera,
-                             world_from_camera);
+    const auto& markers = frame.tracked.markers;
+    return scene_layer_.Draw(
+        *scene_->scene(), *frame.tracked.annotations,
+        markers ? std::span<const MarkerPose>(*markers) : std::span<const MarkerPose>(), camera,
+        world_from_camera);
   };
   cv::Mat picture =
       Augment(*frame.frame, *frame.tracked.snapshot, *frame.tracked.annotations, overlay);

@@ -6,32 +6,20 @@
 #include <utility>
 
 #include "server/anchors/edit_checks.hpp"
+#include "server/app/scene_places.hpp"
 #include "server/scene/placement.hpp"
 #include "server/scene/registration.hpp"
 #include "server/scene/scene_file.hpp"
 #include "shared/models/shapes.hpp"
+#include "shared/scene/object_place.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr std::size_t kWaiting = 32;
 
-std::optional<Rigid3> WorldFromObject(const SceneObject& object,
-                                      const AnnotationList& annotations) {
-  switch (object.parent) {
-    case SceneParent::kWorld:
-      return object.parent_from_object;
-    case SceneParent::kMarker:  // nobody tells its pose yet
-      return std::nullopt;
-    case SceneParent::kAnchor:
-      break;
-  }
-  for (const Annotation& one : annotations) {
-    if (one.id != object.annotation_id || !one.anchor.place_known) continue;
-    return Rigid3{Eigen::Quaterniond::Identity(), one.anchor.point_in_world} *
-           object.parent_from_object;
-  }
-  return std::nullopt;
+std::span<const MarkerPose> AllOf(const std::shared_ptr<const std::vector<MarkerPose>>& markers) {
+  return markers ? std::span<const MarkerPose>(*markers) : std::span<const MarkerPose>();
 }
 
 bool IsSolid(const SceneObject& object) {
@@ -52,28 +40,6 @@ void FailScene(SceneCommand& command, const absl::Status& status) {
 }
 
 }  // namespace
-
-std::vector<PlacedMesh> PlacedMeshes(const Scene& scene, const AnnotationList& annotations) {
-  std::vector<PlacedMesh> meshes;
-  for (const SceneObject& object : scene.objects) {
-    const std::optional<Rigid3> pose = WorldFromObject(object, annotations);
-    if (!pose) continue;
-    const std::shared_ptr<const SceneModel> model = scene.Model(object.model);
-    meshes.push_back({std::make_shared<const TriangleMesh>(MeshOf(object, model.get())), *pose,
-                      object.material});
-  }
-  return meshes;
-}
-
-std::shared_ptr<const Sight> SightOf(const Scene& scene) {
-  std::vector<TriangleMesh> meshes;
-  for (const SceneObject& object : scene.objects) {
-    if (object.material != SceneMaterial::kReal || object.parent != SceneParent::kWorld) continue;
-    Append(MeshOf(object, scene.Model(object.model).get()), object.parent_from_object, 1.0,
-           meshes.emplace_back());
-  }
-  return meshes.empty() ? nullptr : std::make_shared<const Sight>(meshes);
-}
 
 SceneKeeper::SceneKeeper(std::unique_ptr<SceneStore> store)
     : annotations_([] { return std::make_shared<const AnnotationList>(); }),
@@ -112,7 +78,9 @@ absl::Status SceneKeeper::Load() {
     }
   }
   std::shared_ptr<const Sight> sight = SightOf(scene);
+  auto carried = std::make_shared<const CarriedSquareList>(CarriedOf(scene));
   const std::lock_guard lock(mutex_);
+  carried_ = std::move(carried);
   scene_ = std::make_shared<const Scene>(std::move(scene));
   sight_ = std::move(sight);
   return absl::OkStatus();
@@ -123,6 +91,16 @@ std::shared_ptr<const Sight> SceneKeeper::sight() const {
   return sight_;
 }
 
+std::shared_ptr<const CarriedSquareList> SceneKeeper::carried() const {
+  const std::lock_guard lock(mutex_);
+  return carried_;
+}
+
+void SceneKeeper::SetMarkers(std::shared_ptr<const std::vector<MarkerPose>> markers) {
+  const std::lock_guard lock(mutex_);
+  markers_ = std::move(markers);
+}
+
 std::shared_ptr<const Scene> SceneKeeper::scene() const {
   const std::lock_guard lock(mutex_);
   return scene_;
@@ -131,9 +109,13 @@ std::shared_ptr<const Scene> SceneKeeper::scene() const {
 void SceneKeeper::Publish(Scene next) {
   next.revision = scene()->revision + 1;
   std::shared_ptr<const Sight> sight = SightOf(next);
+  CarriedSquareList carried = CarriedOf(next);
   const auto published = std::make_shared<const Scene>(std::move(next));
   {
     const std::lock_guard lock(mutex_);
+    if (carried != *carried_) {
+      carried_ = std::make_shared<const CarriedSquareList>(std::move(carried));
+    }
     sight_ = std::move(sight);
     scene_ = published;
   }
@@ -176,12 +158,29 @@ void SceneKeeper::Run(SceneCommand command) {
   if (auto* found = std::get_if<RegisterSceneObject>(&command)) found->done(RegisterOne(*found));
 }
 
+absl::Status SceneKeeper::CheckMarker(const SceneObject& object) const {
+  const CarriedSquare one{object.marker_family, static_cast<int>(object.marker_id),
+                          object.marker_side_m};
+  if (absl::Status known = CheckCarried(one); !known.ok()) return known;
+  for (const SceneObject& other : scene()->objects) {
+    if (other.parent != SceneParent::kMarker || other.id == object.id) continue;
+    if (other.marker_family == one.family && other.marker_id == object.marker_id &&
+        other.marker_side_m != one.side_m) {
+      return absl::InvalidArgumentError(absl::StrCat("marker.side_m: ", one.side_m, ", but '",
+                                                     other.name, "' has ", other.marker_side_m,
+                                                     " for the same marker; give the same"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status SceneKeeper::CheckObject(const SceneObject& object) const {
   if (absl::Status valid = Validate(object); !valid.ok()) return valid;
   if (object.shape == SceneShape::kModel && scene()->Model(object.model) == nullptr) {
     return absl::NotFoundError(
         absl::StrCat("model: there is no model ", object.model, "; upload it first"));
   }
+  if (object.parent == SceneParent::kMarker) return CheckMarker(object);
   if (object.parent != SceneParent::kAnchor) return absl::OkStatus();
   const std::shared_ptr<const AnnotationList> annotations = annotations_();
   const bool known =
@@ -234,9 +233,14 @@ absl::StatusOr<PlacedObject> SceneKeeper::PlaceOne(const PlaceSceneObject& comma
   }
   const std::shared_ptr<const Scene> scene = this->scene();
   const std::shared_ptr<const AnnotationList> annotations = annotations_();
+  std::shared_ptr<const std::vector<MarkerPose>> markers;
+  {
+    const std::lock_guard lock(mutex_);
+    markers = markers_;
+  }
   std::vector<Obstacle> obstacles;
   for (const SceneObject& object : scene->objects) {
-    const std::optional<Rigid3> pose = WorldFromObject(object, *annotations);
+    const std::optional<Rigid3> pose = WorldFromObject(object, *annotations, AllOf(markers));
     if (!IsSolid(object) || !pose || object.id == command.object.id) continue;
     Obstacle obstacle{object.id, object.name, {}};
     Append(MeshOf(object, scene->Model(object.model).get()), *pose, 1.0, obstacle.in_world);
@@ -247,6 +251,7 @@ absl::StatusOr<PlacedObject> SceneKeeper::PlaceOne(const PlaceSceneObject& comma
   request.world_from_body = command.object.parent_from_object;
   request.gravity = command.gravity;
   request.push = command.push;
+  request.hand_m = command.hand_m;
   const absl::StatusOr<Placement> placed =
       Place(CollisionScene(std::move(obstacles)), body, request);
   if (!placed.ok()) return placed.status();
@@ -254,8 +259,10 @@ absl::StatusOr<PlacedObject> SceneKeeper::PlaceOne(const PlaceSceneObject& comma
   object.parent_from_object = placed->world_from_body;
   absl::StatusOr<SceneObject> put = Put(std::move(object));
   if (!put.ok()) return put.status();
-  PlacedObject result{*std::move(put), std::nullopt, ToContact(placed->support)};
+  PlacedObject result{*std::move(put), std::nullopt, ToContact(placed->support), placed->slid_m,
+                      std::nullopt};
   if (placed->stop) result.stop = ToContact(*placed->stop);
+  if (placed->slide_stop) result.slide_stop = ToContact(*placed->slide_stop);
   return result;
 }
 

@@ -15,8 +15,9 @@
 #include "server/pipeline/scene_commands.hpp"
 #include "server/scene/sight.hpp"
 #include "server/store/scene_store.hpp"
-#include "shared/render/scene_painter.hpp"
+#include "server/tracker/carried_squares.hpp"
 #include "shared/scene/annotation.hpp"
+#include "shared/scene/marker_pose.hpp"
 
 namespace saccade {
 
@@ -47,6 +48,10 @@ class SceneKeeper {
   std::shared_ptr<const Scene> scene() const;
   /// Of what is real and stands still; null: there is nothing.
   std::shared_ptr<const Sight> sight() const;
+  /// Markers that objects are fixed to; never null.
+  std::shared_ptr<const CarriedSquareList> carried() const;
+  /// Where those are now; null: none was seen. Things are placed among them.
+  void SetMarkers(std::shared_ptr<const std::vector<MarkerPose>> markers);
   absl::Status Submit(SceneCommand command);
   /// What was not begun is answered Unavailable.
   void Stop();
@@ -62,6 +67,7 @@ class SceneKeeper {
   absl::StatusOr<std::shared_ptr<const SceneModel>> AddModel(AddSceneModel command);
   absl::StatusOr<RegisteredObject> RegisterOne(const RegisterSceneObject& command);
   absl::Status CheckObject(const SceneObject& object) const;
+  absl::Status CheckMarker(const SceneObject& object) const;
   void Publish(Scene next);
 
   Annotations annotations_;
@@ -70,17 +76,12 @@ class SceneKeeper {
   mutable std::mutex mutex_;
   std::shared_ptr<const Scene> scene_ = std::make_shared<const Scene>();
   std::shared_ptr<const Sight> sight_;
+  std::shared_ptr<const CarriedSquareList> carried_ = std::make_shared<const CarriedSquareList>();
+  std::shared_ptr<const std::vector<MarkerPose>> markers_;
   std::mutex submit_mutex_;
   std::atomic<bool> stopping_ = false;  // set under submit_mutex_
   std::atomic<std::size_t> waiting_ = 0;
   Runner<SceneCommand> runner_;  // last: its thread uses all of the above
 };
-
-/// What is real and stands in the world, for what it hides; null: nothing.
-std::shared_ptr<const Sight> SightOf(const Scene& scene);
-
-/// Meshes of a scene where they are now. What is fixed to an annotation whose place is not known,
-/// or to a marker, is left out.
-std::vector<PlacedMesh> PlacedMeshes(const Scene& scene, const AnnotationList& annotations);
 
 }  // namespace saccade

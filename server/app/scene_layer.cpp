@@ -4,8 +4,9 @@
 
 #include <algorithm>
 
-#include "server/app/scene_keeper.hpp"
+#include "server/app/scene_places.hpp"
 #include "shared/io/log.hpp"
+#include "shared/scene/object_place.hpp"
 
 namespace saccade {
 namespace {
@@ -13,6 +14,26 @@ namespace {
 bool SameLens(const CameraIntrinsics& a, const CameraIntrinsics& b) {
   return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
          a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion;
+}
+
+/// Where things are that are fixed to something; far away: nobody knows.
+std::vector<Rigid3> PlacesOfMoved(const Scene& scene, const AnnotationList& annotations,
+                                  std::span<const MarkerPose> markers) {
+  constexpr double kNowhere_m = 1e9;
+  std::vector<Rigid3> places;
+  for (const SceneObject& object : scene.objects) {
+    if (object.parent == SceneParent::kWorld) continue;
+    places.push_back(
+        WorldFromObject(object, annotations, markers)
+            .value_or(Rigid3{Eigen::Quaterniond::Identity(), Eigen::Vector3d(kNowhere_m, 0, 0)}));
+  }
+  return places;
+}
+
+bool SamePlaces(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b) {
+  return std::ranges::equal(a, b, [](const Rigid3& one, const Rigid3& other) {
+    return one.translation == other.translation && one.rotation.coeffs() == other.rotation.coeffs();
+  });
 }
 
 }  // namespace
@@ -23,7 +44,8 @@ void SceneLayer::SetLight(const SceneLight& light) {
 }
 
 cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
-                         const CameraModel& camera, const Rigid3& world_from_camera) {
+                         std::span<const MarkerPose> markers, const CameraModel& camera,
+                         const Rigid3& world_from_camera) {
   const bool visible = std::any_of(
       scene.objects.begin(), scene.objects.end(),
       [](const SceneObject& object) { return object.material != SceneMaterial::kReal; });
@@ -44,12 +66,12 @@ cv::Mat SceneLayer::Draw(const Scene& scene, const AnnotationList& annotations,
     view_ = *std::move(made);
     intrinsics_ = camera.intrinsics();
   }
-  if (revision_ != scene.revision || moves_) {
-    absl::Status set = view_->SetMeshes(PlacedMeshes(scene, annotations));
+  std::vector<Rigid3> places = PlacesOfMoved(scene, annotations, markers);
+  if (revision_ != scene.revision || !SamePlaces(places, places_)) {
+    absl::Status set = view_->SetMeshes(PlacedMeshes(scene, annotations, markers));
     if (!set.ok()) return give_up(set);
     revision_ = scene.revision;
-    moves_ = std::any_of(scene.objects.begin(), scene.objects.end(),
-                         [](const SceneObject& one) { return one.parent != SceneParent::kWorld; });
+    places_ = std::move(places);
   }
   view_->SetLight(light());
   absl::StatusOr<cv::Mat> drawn = view_->Draw(world_from_camera);

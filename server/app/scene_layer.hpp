@@ -3,6 +3,8 @@
 #include <memory>
 #include <mutex>
 #include <opencv2/core.hpp>
+#include <span>
+#include <vector>
 
 #include "server/gl/gl_context.hpp"
 #include "server/pipeline/events.hpp"
@@ -26,7 +28,8 @@ class SceneLayer {
     return light_;
   }
   /// SceneView::Draw; empty where there is nothing to draw.
-  cv::Mat Draw(const Scene& scene, const AnnotationList& annotations, const CameraModel& camera,
+  cv::Mat Draw(const Scene& scene, const AnnotationList& annotations,
+               std::span<const MarkerPose> markers, const CameraModel& camera,
                const Rigid3& world_from_camera);
 
  private:
@@ -39,7 +42,7 @@ class SceneLayer {
   SceneLight light_;
   bool failed_ = false;
   std::uint64_t revision_ = 0;
-  bool moves_ = false;  // something is fixed to an annotation: uploaded each time
+  std::vector<Rigid3> places_;  // as uploaded, of what is fixed to something
 };
 
 }  // namespace saccade

@@ -9,6 +9,8 @@
 #include "shared/scene/annotation.hpp"
 #include "shared/scene/gaze.hpp"
 #include "shared/scene/map_snapshot.hpp"
+#include "shared/scene/marker_pose.hpp"
+#include "shared/scene/scene_light.hpp"
 #include "shared/scene/scene_object.hpp"
 #include "shared/time/timestamp.hpp"
 
@@ -30,6 +32,8 @@ struct TrackedEvent {
   std::shared_ptr<const AnnotationList> annotations;  // never null
   std::shared_ptr<const CameraModel> camera;          // never null
   StageTimestamps stages;
+  std::shared_ptr<const std::vector<MarkerPose>> markers;  // that move; null: none was seen
+  SceneLight light;
 };
 
 enum class VideoView { kRaw, kAugmented };

@@ -24,6 +24,8 @@ struct PlacedObject {
   SceneObject object;
   std::optional<SceneContact> stop;  // none: it was not pushed
   SceneContact support;
+  double slid_m = 0;                       // along what stopped it
+  std::optional<SceneContact> slide_stop;  // what it met while it slid
 };
 struct RegisteredObject {
   SceneObject object;
@@ -44,6 +46,7 @@ struct PlaceSceneObject {
   SceneObject object;
   std::optional<Eigen::Vector3d> push;
   Eigen::Vector3d gravity = Eigen::Vector3d::UnitY();
+  double hand_m = 0;  // how far the hand goes that pushes
   Done<PlacedObject> done;
 };
 struct AddSceneModel {

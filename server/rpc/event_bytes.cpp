@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "shared/wire/gaze.hpp"
+#include "shared/wire/scene.hpp"
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade {
@@ -18,6 +19,13 @@ void AppendVarint(std::uint64_t value, std::string& out) {
   const std::uint8_t* end =
       google::protobuf::io::CodedOutputStream::WriteVarint64ToArray(value, buffer);
   out.append(reinterpret_cast<const char*>(buffer), static_cast<std::size_t>(end - buffer));
+}
+
+v1::PoseEvent PoseToProto(const TrackedEvent& tracked) {
+  v1::PoseEvent pose = wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns);
+  if (tracked.markers == nullptr) return pose;
+  for (const MarkerPose& marker : *tracked.markers) *pose.add_markers() = wire::ToProto(marker);
+  return pose;
 }
 
 v1::AccessUnit AccessUnitToProto(const VideoPacket& packet, bool features) {
@@ -33,7 +41,7 @@ v1::AccessUnit AccessUnitToProto(const VideoPacket& packet, bool features) {
   coded.width = packet.width;
   coded.height = packet.height;
   *unit.mutable_intrinsics() = wire::ToProto(coded);
-  *unit.mutable_pose() = wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns);
+  *unit.mutable_pose() = PoseToProto(tracked);
   v1::StageTimestamps& stages = *unit.mutable_stages();
   stages.set_captured_ns(tracked.stages.captured_ns);
   stages.set_received_ns(tracked.stages.received_ns);
@@ -77,8 +85,7 @@ Bytes EventBytes::AccessUnit(const std::shared_ptr<const VideoPacket>& packet, b
 
 Bytes EventBytes::Pose(const TrackedEvent& tracked) {
   return poses_.Get({tracked.snapshot, 0}, [&] {
-    return std::make_shared<const std::string>(
-        wire::ToProtoPose(*tracked.snapshot, tracked.stages.captured_ns).SerializeAsString());
+    return std::make_shared<const std::string>(PoseToProto(tracked).SerializeAsString());
   });
 }
 

@@ -2,16 +2,34 @@
 
 #include <absl/container/flat_hash_map.h>
 
+#include <cmath>
 #include <string>
 
 #include "shared/wire/scene.hpp"
 
 namespace saccade {
 
-bool SceneReader::Next(const std::shared_ptr<const Scene>& scene, v1::SceneEvent& event) {
+namespace {
+
+constexpr double kSeen = 0.03;  // of the brightness of what is lit
+
+}  // namespace
+
+bool SceneReader::IsOther(const SceneLight& light) const {
+  const Eigen::Vector3d turn = light.toward_in_world - light_.toward_in_world;
+  return std::abs(light.level - light_.level) > kSeen ||
+         std::abs(light.confidence - light_.confidence) > kSeen || turn.norm() > kSeen;
+}
+
+bool SceneReader::Next(const std::shared_ptr<const Scene>& scene, const SceneLight& light,
+                       v1::SceneEvent& event) {
   // Two who publish at once may come here in either order.
-  if (told_ != nullptr && scene->revision <= told_->revision) return false;
-  event.set_revision(scene->revision);
+  const bool newer = told_ == nullptr || scene->revision > told_->revision;
+  if (!newer && !IsOther(light)) return false;
+  light_ = light;
+  *event.mutable_light() = wire::ToProto(light);
+  event.set_revision(newer ? scene->revision : told_->revision);
+  if (!newer) return true;
   event.set_full(told_ == nullptr);
   absl::flat_hash_map<std::string, std::string> before;  // bytes by id
   if (told_ != nullptr) {

@@ -35,6 +35,7 @@ absl::StatusOr<PlaceSceneObject> ToCommand(const v1::PlaceSceneObjectRequest& re
         wire::FromProto(request.push_in_world(), "push_in_world");
     if (!push.ok()) return push.status();
     command.push = *push;
+    command.hand_m = request.hand_m();
   }
   if (!request.has_gravity_in_world()) return command;
   absl::StatusOr<Eigen::Vector3d> gravity =
@@ -151,6 +152,8 @@ grpc::ServerUnaryReactor* SceneService::PlaceObject(Context* context,
   command->done = call.Answer<PlacedObject>([response](const PlacedObject& placed) {
     *response->mutable_object() = wire::ToProto(placed.object);
     if (placed.stop) *response->mutable_stop() = ToProto(*placed.stop);
+    if (placed.slide_stop) *response->mutable_slide_stop() = ToProto(*placed.slide_stop);
+    response->set_slid_m(placed.slid_m);
     *response->mutable_support() = ToProto(placed.support);
   });
   return call.Submitted(backend_.SubmitScene(*std::move(command)));

@@ -212,9 +212,11 @@ std::optional<Subscription::Payload> Subscription::FillPointers() {
 
 // Nobody shares it: it is rare.
 std::optional<Subscription::Payload> Subscription::FillScene() {
-  if (!Has(v1::TOPIC_SCENE) || !std::exchange(scene_due_, false)) return std::nullopt;
+  if (!Has(v1::TOPIC_SCENE) || scene_ == nullptr) return std::nullopt;
+  const SceneLight light = state_ ? state_->tracked.light : SceneLight();
+  if (!std::exchange(scene_due_, false) && !scene_reader_.IsOther(light)) return std::nullopt;
   v1::SceneEvent event;
-  if (!scene_reader_.Next(scene_, event)) return std::nullopt;
+  if (!scene_reader_.Next(scene_, light, event)) return std::nullopt;
   return Payload{v1::Event::kSceneFieldNumber, Serialized(event)};
 }
 

@@ -2,7 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace saccade {
 namespace {
@@ -10,6 +12,9 @@ namespace {
 constexpr double kRaise_m = 5e-3;     // off the floor while it is pushed
 constexpr double kMostSunk_m = 2e-2;  // what a thing let go on the floor may be too low
 constexpr double kBisection_m = 1e-4;
+constexpr double kHeadOn = 0.05;  // sine: what meets a wall so does not slide
+constexpr double kLeastSlide_m = 1e-3;
+constexpr int kMostTurns = 4;  // things that it slides along, one after the other
 
 Rigid3 Shifted(const Rigid3& pose, const Eigen::Vector3d& by) {
   return {pose.rotation, pose.translation + by};
@@ -25,6 +30,10 @@ absl::Status Check(const PlacementRequest& request) {
   }
   if (request.push && !request.push->allFinite()) {
     return absl::InvalidArgumentError("push: not finite");
+  }
+  if (!(request.hand_m >= 0 && request.hand_m <= request.most_push_m)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("hand_m: ", request.hand_m, "; give 0 to ", request.most_push_m, " metres"));
   }
   return absl::OkStatus();
 }
@@ -63,6 +72,35 @@ absl::StatusOr<Rigid3> FreeStart(const CollisionScene& scene, const Body& body,
                                                     "'; let it go where there is room"));
 }
 
+/// Along what stopped it, as far as the hand goes on; into a corner, not out of it again.
+void Slide(const CollisionScene& scene, const Body& body, const PlacementRequest& request,
+           const Eigen::Vector3d& way, Rigid3& pose, Placement& placement) {
+  const auto level = [&request](const Eigen::Vector3d& v) {
+    return Eigen::Vector3d(v - v.dot(request.gravity) * request.gravity);
+  };
+  double left_m = request.hand_m - placement.stop->moved_m;
+  std::vector<Eigen::Vector3d> walls;
+  Contact last = *placement.stop;
+  for (int turn = 0; turn < kMostTurns && left_m > kLeastSlide_m; ++turn) {
+    const Eigen::Vector3d normal = level(last.normal_in_world);
+    if (!(normal.norm() > kHeadOn)) return;  // it stands on what stops it: a step
+    walls.push_back(normal.normalized());
+    const Eigen::Vector3d along = way - way.dot(walls.back()) * walls.back();
+    const double share = along.norm();
+    const auto into = [&along](const Eigen::Vector3d& wall) { return along.dot(wall) < -1e-6; };
+    if (share < kHeadOn || std::any_of(walls.begin(), walls.end() - 1, into)) return;
+    const std::optional<Contact> next =
+        MoveUntilTouch(scene, body, along / share, share * left_m, pose);
+    const double moved_m = next ? next->moved_m : share * left_m;
+    if (!next) pose = Shifted(pose, moved_m * along / share);
+    placement.slid_m += moved_m;
+    placement.world_from_turns.push_back(pose);
+    left_m -= moved_m / share;
+    if (!next) return;
+    placement.slide_stop = last = *next;
+  }
+}
+
 absl::Status Push(const CollisionScene& scene, const Body& body, const PlacementRequest& request,
                   Rigid3& pose, Placement& placement) {
   const Eigen::Vector3d level =
@@ -81,6 +119,8 @@ absl::Status Push(const CollisionScene& scene, const Body& body, const Placement
         absl::StrCat("push: nothing stops it within ", request.most_push_m,
                      " m; push it another way, or add the wall to the scene"));
   }
+  placement.world_from_turns.push_back(pose);
+  Slide(scene, body, request, level.normalized(), pose, placement);
   placement.world_from_pushed = pose;
   return absl::OkStatus();
 }

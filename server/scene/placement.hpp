@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/scene/collision.hpp"
 
@@ -15,6 +16,9 @@ struct PlacementRequest {
   /// Where to push it first, of any length; the part along gravity is left out. None: not at all.
   std::optional<Eigen::Vector3d> push;
   double most_push_m = 20.0;
+  /// How far the hand goes that pushes: what meets something aslant before that slides along it as
+  /// the hand goes on. 0: it stops where it touches.
+  double hand_m = 0.0;
   double most_drop_m = 5.0;
 };
 
@@ -30,6 +34,9 @@ struct Placement {
   Rigid3 world_from_start;                  // where it was let go, raised if it had to be
   std::optional<Rigid3> world_from_pushed;  // before it was lowered; none: it was not pushed
   std::optional<Contact> stop;              // what stopped the push
+  double slid_m = 0;                        // along that
+  std::optional<Contact> slide_stop;        // what it met while it slid
+  std::vector<Rigid3> world_from_turns;     // where it touched, and where each slide ended
   Rigid3 world_from_body;                   // at rest
   Contact support;
 };
@@ -38,9 +45,11 @@ struct Placement {
 /// nor a touch that rounding turns into a cut.
 inline constexpr double kContactGap_m = 2e-4;
 
-/// Pushes a thing until it touches something, then lowers it until it rests. It does not turn.
+/// Pushes a thing until it touches something, lets it slide along that as far as the hand still
+/// goes, then lowers it until it rests. It does not turn.
 /// One that is let go within 2 cm below where it is free (on the floor, say) is raised first.
-///   InvalidArgument     not finite, gravity not a unit vector, a push along gravity
+///   InvalidArgument     not finite, gravity not a unit vector, a push along gravity, a hand that
+///                       goes farther than `most_push_m`
 ///   FailedPrecondition  it starts inside of something, nothing stops the push within
 ///                       `most_push_m`, nothing holds it within `most_drop_m`; names what and how
 ///                       far

@@ -137,6 +137,8 @@ absl::Status ReadMarker(const json& value, const std::string& at, SceneObject& o
   } else {
     object.marker_id = static_cast<std::uint32_t>(id);
   }
+  fields.Require("side_m");
+  fields.Number("side_m", object.marker_side_m);
   object.parent = SceneParent::kMarker;
   return fields.Finish();
 }
@@ -276,7 +278,9 @@ std::string SceneToJson(const std::vector<SceneObject>& objects) {
     one["position_m"] = {p.x(), p.y(), p.z()};
     one["rotation_xyzw"] = {q.x(), q.y(), q.z(), q.w()};
     if (object.parent == SceneParent::kMarker) {
-      one["marker"] = {{"family", object.marker_family}, {"id", object.marker_id}};
+      one["marker"] = {{"family", object.marker_family},
+                       {"id", object.marker_id},
+                       {"side_m", object.marker_side_m}};
     }
     if (object.parent == SceneParent::kAnchor) one["annotation"] = object.annotation_id;
     list.push_back(std::move(one));

@@ -8,6 +8,7 @@
 
 #include "server/capture/frame.hpp"
 #include "server/scene/sight.hpp"
+#include "server/tracker/carried_squares.hpp"
 #include "server/tracker/lens_state.hpp"
 #include "shared/scene/map_snapshot.hpp"
 #include "shared/scene/scene_light.hpp"
@@ -42,6 +43,8 @@ class FrameTracker {
   /// What stands still in the world, from the next frame on: landmarks behind it are not attempted.
   /// Null: nothing is known of it.
   virtual void SetSight(std::shared_ptr<const Sight> /*sight*/) {}
+  /// Squares that move, from the next frame on: none of them is a landmark. Never null.
+  virtual void SetCarried(std::shared_ptr<const CarriedSquareList> /*carried*/) {}
   /// Where light comes from, by what the frames so far show of it.
   virtual SceneLight light() const { return {}; }
   /// The lens of the frame tracked last, where it is learnt; null: that of the frames.

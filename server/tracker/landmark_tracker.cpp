@@ -119,7 +119,9 @@ bool LandmarkTracker::TakeDetection(const Frame& frame) {
   if (age_s < 0.0 || IsGap(seen->time_ns, frame.capture_time_ns)) return false;
   // What carries on with one square is not thrown away for another's word.
   if (started_ && poor_in_row_ == 0) return false;
-  const auto pose = PoseOfSquares(*frame.camera, seen->sightings, map_);
+  std::vector<MarkerSighting> standing = seen->sightings;
+  std::erase_if(standing, [this](const auto& one) { return IsCarried(one.family, one.id); });
+  const auto pose = PoseOfSquares(*frame.camera, standing, map_);
   if (!pose) return false;
   Matrix6d covariance = pose->fit.covariance;
   covariance.diagonal().head<3>().array() += kFirstPosition_m * kFirstPosition_m;
@@ -131,8 +133,14 @@ bool LandmarkTracker::TakeDetection(const Frame& frame) {
   return true;
 }
 
+bool LandmarkTracker::IsCarried(const std::string& family, int id) const {
+  return std::ranges::any_of(
+      *carried_, [&](const CarriedSquare& one) { return one.id == id && one.family == family; });
+}
+
 void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
   const CameraModel& camera = *frame.camera;
+  if (IsCarried(map_.squares[k].family, map_.squares[k].id)) return;
   const Rigid3 square_from_camera =
       map_.squares[k].world_from_square.Inverse() * filter_.WorldFromCamera();
   const Eigen::Vector3d& at = square_from_camera.translation;

@@ -38,6 +38,9 @@ class LandmarkTracker final : public FrameTracker {
                                         double) override;
 
   void SetSight(std::shared_ptr<const Sight> sight) override { sight_ = std::move(sight); }
+  void SetCarried(std::shared_ptr<const CarriedSquareList> carried) override {
+    carried_ = std::move(carried);
+  }
   SceneLight light() const override { return light_.light(); }
 
   /// What the detector took for the picture it answered for last [ms]; 0: it did not answer.
@@ -56,6 +59,7 @@ class LandmarkTracker final : public FrameTracker {
   LandmarkTracker(const LandmarkOptions& options, SquareMap map,
                   std::unique_ptr<MarkerDetector> detector);
   void Measure(const Frame& frame);
+  bool IsCarried(const std::string& family, int id) const;
   void SearchOne(const Frame& frame, std::size_t square);
   /// Where the detector has found the camera, it begins there; true if it did.
   bool TakeDetection(const Frame& frame);
@@ -66,7 +70,8 @@ class LandmarkTracker final : public FrameTracker {
   const SquareMap map_;
   std::vector<std::array<Eigen::Vector3d, 4>> points_;  // of each square's corners, in world
   std::vector<double> border_shares_;                   // of each
-  std::shared_ptr<const Sight> sight_;                  // null: nothing is known to be in the way
+  std::shared_ptr<const CarriedSquareList> carried_ = std::make_shared<const CarriedSquareList>();
+  std::shared_ptr<const Sight> sight_;  // null: nothing is known to be in the way
   SquareWatch watch_;
   SquareDoubts doubts_;
   LightFit light_;

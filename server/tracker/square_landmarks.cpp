@@ -48,6 +48,20 @@ SquareLandmarks::SquareLandmarks(const LandmarkOptions& options, SquareMap known
   mapped_share_ = BorderShare(options_.family);
 }
 
+void SquareLandmarks::SetCarried(std::shared_ptr<const CarriedSquareList> carried) {
+  if (carried == carried_) return;
+  carried_ = std::move(carried);
+  for (const CarriedSquare& one : *carried_) {
+    mapped_.erase({one.family, one.id});
+    views_.erase({one.family, one.id});
+  }
+}
+
+bool SquareLandmarks::IsCarried(const std::string& family, int id) const {
+  return std::ranges::any_of(
+      *carried_, [&](const CarriedSquare& one) { return one.id == id && one.family == family; });
+}
+
 void SquareLandmarks::Reset() {
   watch_.Drop();
   newest_.clear();
@@ -89,6 +103,7 @@ void SquareLandmarks::Take(const CameraModel& camera, const SquareWatch::Seen& s
   if (seen.mirrored) doubts_.AddMirrored(*seen.mirrored);
   for (const std::string& words : doubts_.Take()) Log(absl::StrCat("landmarks: ", words));
   newest_ = seen.sightings;
+  std::erase_if(newest_, [this](const auto& one) { return IsCarried(one.family, one.id); });
   for (const MarkerSighting& sighting : newest_) {
     const auto same = [&](const MarkerSighting& other) {
       return other.id == sighting.id && other.family == sighting.family;
@@ -194,6 +209,7 @@ void SquareLandmarks::Search(const Frame& frame, const Rigid3& pose, const Matri
   std::array<FeatureState, 4> states;
   for (std::size_t k = 0; with_known && k < known_.squares.size(); ++k) {
     const KnownSquare& square = known_.squares[k];
+    if (IsCarried(square.family, square.id)) continue;
     SearchOne(frame, pose, covariance, motion, filter.readout_s(),
               {square.world_from_square, SquareCorners(square.family, square.side_m),
                known_shares_[k], 0},

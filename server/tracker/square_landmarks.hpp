@@ -15,6 +15,7 @@
 #include "server/markers/square_watch.hpp"
 #include "server/scene/light_fit.hpp"
 #include "server/scene/sight.hpp"
+#include "server/tracker/carried_squares.hpp"
 #include "server/tracker/landmark_options.hpp"
 #include "server/tracker/marker_fit.hpp"
 #include "server/tracker/square_doubts.hpp"
@@ -35,6 +36,7 @@ class SquareLandmarks {
 
   /// See FrameTracker.
   void SetSight(std::shared_ptr<const Sight> sight) { sight_ = std::move(sight); }
+  void SetCarried(std::shared_ptr<const CarriedSquareList> carried);
   SceneLight light() const { return light_.light(); }
   /// The map was thrown away.
   void Reset();
@@ -105,6 +107,7 @@ class SquareLandmarks {
   SquareLandmarks(const LandmarkOptions& options, SquareMap known,
                   std::unique_ptr<MarkerDetector> detector);
   void Take(const CameraModel& camera, const SquareWatch::Seen& seen);
+  bool IsCarried(const std::string& family, int id) const;
   /// Whether a square is as large as the map's metre has it; tells of one that is not.
   bool HasItsSize(const CameraModel& camera, const Key& key);
   void SearchOne(const Frame& frame, const Rigid3& pose, const Matrix6d& covariance,
@@ -115,6 +118,7 @@ class SquareLandmarks {
   const LandmarkOptions options_;
   const SquareMap known_;
   std::shared_ptr<const Sight> sight_;  // null: nothing is known to be in the way
+  std::shared_ptr<const CarriedSquareList> carried_ = std::make_shared<const CarriedSquareList>();
   SquareWatch watch_;
   SquareDoubts doubts_;
   std::set<Key> misprinted_;  // of another size than said: not mapped

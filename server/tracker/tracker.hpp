@@ -62,6 +62,9 @@ class Tracker final : public FrameTracker {
   void SetSight(std::shared_ptr<const Sight> sight) override {
     if (squares_) squares_->SetSight(std::move(sight));
   }
+  void SetCarried(std::shared_ptr<const CarriedSquareList> carried) override {
+    if (squares_) squares_->SetCarried(std::move(carried));
+  }
   SceneLight light() const override { return squares_ ? squares_->light() : SceneLight(); }
   std::optional<LensState> lens_state() const override {
     return learner_ ? std::optional(learner_->state()) : std::nullopt;

@@ -45,6 +45,11 @@ absl::Status CheckParent(const SceneObject& object) {
   if (object.parent == SceneParent::kMarker && object.marker_family.empty()) {
     return absl::InvalidArgumentError("marker.family: is empty; name the marker's family");
   }
+  const double side_m = object.marker_side_m;
+  if (object.parent == SceneParent::kMarker && !(side_m >= 0.005 && side_m <= 5.0)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "marker.side_m: ", side_m, "; give the side of the marker's black border, 0.005 to 5 m"));
+  }
   if (object.parent == SceneParent::kAnchor && object.annotation_id.empty()) {
     return absl::InvalidArgumentError("annotation_id: is empty; name the annotation to move with");
   }

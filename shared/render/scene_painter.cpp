@@ -185,6 +185,11 @@ void ScenePainter::Draw(const Eigen::Matrix4f& clip_from_camera, const Rigid3& w
   gl_.Enable(GL_BLEND);
   gl_.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   shaded_->Set("alpha", kHiddenAlpha);
+  // Of what is hidden the nearest surface alone is seen, in whatever order triangles come.
+  gl_.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  hidden_.Draw();
+  gl_.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  gl_.DepthFunc(GL_LEQUAL);
   hidden_.Draw();
   gl_.Disable(GL_BLEND);
 }

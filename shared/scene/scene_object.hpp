@@ -36,6 +36,7 @@ struct SceneObject {
   SceneParent parent = SceneParent::kWorld;
   std::string marker_family;    // of kMarker
   std::uint32_t marker_id = 0;  // of kMarker
+  double marker_side_m = 0;     // of kMarker: of its black border
   std::string annotation_id;    // of kAnchor: whose place it moves with, its turn does not
   Rigid3 parent_from_object;
   std::uint32_t color_rgba = 0xb4b4b4ff;  // of what is no model

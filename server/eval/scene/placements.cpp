@@ -55,6 +55,7 @@ PlacementRequest RandomRequest(const Rigid3& world_from_room, std::mt19937_64& r
   if (random() % 5 != 0) {
     const double angle = M_PI * unit(random);
     request.push = Eigen::Vector3d(std::cos(angle), 0.1 * unit(random), std::sin(angle));
+    if (random() % 2 == 0) request.hand_m = 2.0 + 2.0 * unit(random);
   }
   return request;
 }
@@ -79,14 +80,14 @@ bool RightlyRefused(const PlacementJudge& judge, const TriangleMesh& mesh,
 
 std::string Line(std::uint64_t index, const PlacementOutcome& one) {
   if (!one.refused.empty()) {
-    return absl::StrFormat("%d,%s,%d,%d,,,,,,,,%s,%s\n", index, one.thing, one.thing_triangles,
+    return absl::StrFormat("%d,%s,%d,%d,,,,,,,,%s,%s,\n", index, one.thing, one.thing_triangles,
                            one.room_triangles, one.refused_rightly ? "refused" : "refused_wrongly",
                            absl::StrCat("\"", one.refused, "\""));
   }
-  return absl::StrFormat("%d,%s,%d,%d,%d,%s,%s,%.4f,%.4f,%.4f,%d,placed,\n", index, one.thing,
+  return absl::StrFormat("%d,%s,%d,%d,%d,%s,%s,%.4f,%.4f,%.4f,%d,placed,,%.2f\n", index, one.thing,
                          one.thing_triangles, one.room_triangles, one.pushed, one.stop, one.support,
                          1e3 * one.push_gap_m, 1e3 * one.rest_gap_m, 1e3 * one.distance_m,
-                         one.path_free);
+                         one.path_free, 1e3 * one.slid_m);
 }
 
 void Count(const PlacementOutcome& one, PlacementsSummary& summary) {
@@ -97,6 +98,7 @@ void Count(const PlacementOutcome& one, PlacementsSummary& summary) {
   }
   ++summary.placed;
   summary.pushed += one.pushed ? 1 : 0;
+  summary.slid += one.slid_m > 0 ? 1 : 0;
   summary.concave += one.thing != "box" && one.thing != "ball" ? 1 : 0;
   const double least = std::min(one.rest_gap_m, one.pushed ? one.push_gap_m : 0.0);
   const double most = std::max(one.rest_gap_m, one.pushed ? one.push_gap_m : 0.0);
@@ -137,9 +139,14 @@ PlacementOutcome RunPlacement(std::uint64_t seed, std::uint64_t index) {
     outcome.stop = placed->stop->obstacle_name;
     const Eigen::Vector3d level =
         (*request.push - request.push->dot(request.gravity) * request.gravity).normalized();
-    outcome.push_gap_m = judge.Gap(thing.mesh, before, level, kJudged_m);
-    const Rigid3 begin{before.rotation, before.translation - placed->stop->moved_m * level};
-    outcome.path_free = outcome.path_free && PathFree(judge, thing.mesh, begin, before);
+    outcome.push_gap_m = judge.Gap(thing.mesh, placed->world_from_turns[0], level, kJudged_m);
+    const std::vector<Rigid3>& turns = placed->world_from_turns;
+    Rigid3 from{before.rotation, turns[0].translation - placed->stop->moved_m * level};
+    for (const Rigid3& to : turns) {
+      outcome.path_free = outcome.path_free && PathFree(judge, thing.mesh, from, to);
+      from = to;
+    }
+    outcome.slid_m = placed->slid_m;
   }
   return outcome;
 }
@@ -152,7 +159,7 @@ absl::StatusOr<PlacementsSummary> RunPlacements(std::uint64_t seed, int count,
   if (!csv.ok()) return csv.status();
   csv->Write(
       "index,thing,thing_triangles,room_triangles,pushed,stop,support,push_gap_mm,rest_gap_mm,"
-      "distance_mm,path_free,outcome,why\n");
+      "distance_mm,path_free,outcome,why,slid_mm\n");
   PlacementsSummary summary;
   for (std::uint64_t index = 0; summary.placed < count; ++index) {
     const PlacementOutcome outcome = RunPlacement(seed, index);
@@ -164,6 +171,7 @@ absl::StatusOr<PlacementsSummary> RunPlacements(std::uint64_t seed, int count,
   const nlohmann::json report = {{"seed", seed},
                                  {"placed", summary.placed},
                                  {"pushed", summary.pushed},
+                                 {"slid", summary.slid},
                                  {"concave_things", summary.concave},
                                  {"refused", summary.refused},
                                  {"refused_wrongly", summary.wrongly_refused},

@@ -15,6 +15,7 @@ struct PlacementOutcome {
   std::string thing;
   std::size_t thing_triangles = 0, room_triangles = 0;
   bool pushed = false;
+  double slid_m = 0;          // along what stopped it
   std::string stop, support;  // names of what was touched
   /// How far it could go on the way it came, push and fall; negative: it cuts by that.
   double push_gap_m = 0, rest_gap_m = 0;
@@ -28,7 +29,7 @@ struct PlacementOutcome {
 PlacementOutcome RunPlacement(std::uint64_t seed, std::uint64_t index);
 
 struct PlacementsSummary {
-  int placed = 0, refused = 0, wrongly_refused = 0, pushed = 0, concave = 0;
+  int placed = 0, refused = 0, wrongly_refused = 0, pushed = 0, concave = 0, slid = 0;
   double worst_penetration_m = 0, worst_gap_m = 0;
   int failed = 0;  // penetration or gap of 1 mm and more, or something in the way was passed
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "saccade/v1/scene.grpc.pb.h"
 #include "tests/integration/stream/in_process_server.hpp"
@@ -90,6 +91,60 @@ TEST_F(SceneCalls, AThingIsPushedToTheWallAndStandsOnTheFloor) {
   ASSERT_TRUE(Call(&v1::SceneService::Stub::PlaceObject, request, placed).ok());
   EXPECT_NEAR(placed.object().parent_from_object().translation_m().x(), -1.8, 1e-3);
   EXPECT_EQ(List().objects_size(), 2);
+}
+
+TEST_F(SceneCalls, AslantItSlidesAsFarAsTheHandGoes) {
+  AddRoom();
+  v1::PlaceSceneObjectRequest request;
+  *request.mutable_object() = Box("crate", 0.4, 0.3, 0.2);
+  request.mutable_push_in_world()->set_x(1);
+  request.mutable_push_in_world()->set_z(0.5);
+  request.set_hand_m(2.5);
+  v1::PlaceSceneObjectResponse placed;
+  const grpc::Status status = Call(&v1::SceneService::Stub::PlaceObject, request, placed);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_NEAR(placed.object().parent_from_object().translation_m().x(), 1.8, 1e-3);
+  EXPECT_NEAR(placed.object().parent_from_object().translation_m().z(), 2.5 / std::sqrt(5), 1e-3);
+  EXPECT_GT(placed.slid_m(), 0.1);
+  EXPECT_FALSE(placed.has_slide_stop());
+  request.set_hand_m(12);
+  *request.mutable_object() = placed.object();
+  ASSERT_TRUE(Call(&v1::SceneService::Stub::PlaceObject, request, placed).ok());
+  EXPECT_NEAR(placed.object().parent_from_object().translation_m().z(), 1.9, 1e-3);
+  EXPECT_EQ(placed.slide_stop().object_name(), "room");
+}
+
+TEST_F(SceneCalls, AThingMayBeFixedToAMarkerThatCanBeFollowed) {
+  v1::SceneObject drawer = Box("drawer", 0.4, 0.2, 0.4);
+  drawer.mutable_marker()->set_family("apriltag36h11");
+  drawer.mutable_marker()->set_id(3);
+  drawer.mutable_marker()->set_side_m(0.08);
+  v1::PutSceneObjectResponse put;
+  grpc::Status status = Put(drawer, put);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  ASSERT_TRUE(List().objects(0).has_marker());
+  EXPECT_EQ(List().objects(0).marker().id(), 3u);
+  EXPECT_EQ(List().objects(0).marker().side_m(), 0.08);
+
+  const auto refused = [&](const v1::SceneObject& object, const std::string& words) {
+    const grpc::Status why = Put(object, put);
+    EXPECT_EQ(why.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_THAT(why.error_message(), HasSubstr(words));
+  };
+  v1::SceneObject other = drawer;
+  other.mutable_marker()->set_side_m(0.1);
+  refused(other, "marker.side_m: 0.1, but 'drawer' has 0.08");
+  other.mutable_marker()->set_side_m(0);
+  refused(other, "marker.side_m: 0; give");
+  other = drawer;
+  other.mutable_marker()->set_family("koller");
+  refused(other, "marker.family: 'koller' cannot be followed");
+  other.mutable_marker()->set_family("apriltag36h11");
+  other.mutable_marker()->set_id(100'000);
+  refused(other, "marker.id: ");
+  other = drawer;
+  other.set_annotation_id("1b4e28ba-2fa1-41d2-883f-0016d3cca427");
+  refused(other, "object: has both marker and annotation_id");
 }
 
 TEST_F(SceneCalls, RefusalsNameFieldAndReason) {

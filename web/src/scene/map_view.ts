@@ -73,10 +73,7 @@ export class MapView {
     const placeOf = (id: string): Vec3 | undefined =>
       session.annotations.get(id)?.anchor.pointInWorld;
     this.things = new ThingMeshes(session.scene, placeOf, true);
-    const light = new THREE.DirectionalLight(0xffffff, 2);
-    light.target.position.set(0, 0, -1);
-    this.eye.add(light, light.target);
-    this.thingScene.add(this.things.object, this.eye, new THREE.AmbientLight(0xffffff, 1.2));
+    this.thingScene.add(this.things.object, this.eye);
     this.scene.add(groundGrid(), this.cloud.object, this.path.object, this.frustum.object);
   }
 
@@ -151,6 +148,7 @@ export class MapView {
     this.eye.updateMatrixWorld(); // it belongs to the second scene
     this.renderer.clear();
     this.renderer.render(this.scene, this.eye);
+    this.things.lightFor(this.eye);
     // After the map, of which known surfaces hide nothing.
     this.renderer.render(this.thingScene, this.eye);
     return true;
@@ -159,7 +157,8 @@ export class MapView {
   private updateContent(nowMs: number, shown: ShownFrame | undefined): void {
     this.contentMs = nowMs;
     if (this.cloud.update(this.session.map)) this.dirty = true;
-    if (this.things.update(this.selectedThing)) this.dirty = true;
+    const markers = this.session.pose?.markers ?? [];
+    if (this.things.update(markers, this.selectedThing)) this.dirty = true;
     if (this.path.update(this.session.path)) this.dirty = true;
     this.updateFrustum(shown);
   }

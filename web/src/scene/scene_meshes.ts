@@ -1,9 +1,10 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { threeFromWorld, threeOrientation, worldFromThree } from '../geometry/axes';
-import { compose, type Rigid3 } from '../geometry/rigid3';
+import type { Rigid3 } from '../geometry/rigid3';
 import type { Vec3 } from '../geometry/vec3';
 import type { Thing } from '../session/scene_book';
+import { hiddenDepth, type LightUniforms, shaded } from './scene_light';
 
 /** What is real hides what is more than this behind it, along the optic axis [m]. */
 export const OCCLUSION_BIAS_M = 0.005;
@@ -39,19 +40,7 @@ export const depthOnly = (): THREE.ShaderMaterial =>
 const EDGE_COLOUR = '#8b9097';
 const ACCENT_COLOUR = '#c4b0ff';
 
-const ORDER = { real: 0, virtual: 1, guide: 1, hidden: 2 } as const;
-
-/** Shaded by a light at the eye; what is hidden shows through everything. */
-function shaded(color: THREE.Color, hidden: boolean): THREE.Material {
-  return new THREE.MeshLambertMaterial({
-    color,
-    side: THREE.DoubleSide,
-    flatShading: true,
-    transparent: hidden,
-    opacity: hidden ? 0.65 : 1,
-    depthTest: !hidden,
-  });
-}
+const ORDER = { real: 0, virtual: 1, guide: 1, hidden: 3 } as const;
 
 function shapeGeometry(thing: Thing): THREE.BufferGeometry {
   const { x, y, z } = thing.sizeM;
@@ -123,17 +112,19 @@ function edgesOf(geometry: THREE.BufferGeometry): THREE.LineSegments {
 export async function meshesOf(
   thing: Thing,
   model: Uint8Array | undefined,
+  light: LightUniforms,
   outside = false,
 ): Promise<THREE.Group> {
   const group = new THREE.Group();
   for (const { geometry, color } of await geometriesOf(thing, model)) {
     const material =
-      thing.material === 'real' ? depthOnly() : shaded(color, thing.material === 'hidden');
+      thing.material === 'real' ? depthOnly() : shaded(color, thing.material === 'hidden', light);
     if (outside && thing.shape === 'room') material.side = THREE.BackSide;
     const mesh = new THREE.Mesh(geometry, material);
     mesh.renderOrder = ORDER[thing.material];
     mesh.frustumCulled = false;
     group.add(mesh);
+    if (thing.material === 'hidden') group.add(hiddenDepth(mesh));
     const few = geometry.getAttribute('position').count <= MOST_WITH_EDGES;
     if (outside && few && thing.material === 'real') group.add(edgesOf(geometry));
   }
@@ -149,12 +140,10 @@ export function accent(group: THREE.Group, selected: boolean): void {
   }
 }
 
-/** Puts it where it is; `anchor`: the place of the annotation that it moves with, if it does. */
-export function pose(group: THREE.Group, thing: Thing, anchor: Vec3 | undefined): void {
-  group.visible = thing.annotationId === '' || anchor !== undefined;
-  const world: Rigid3 = anchor
-    ? compose({ rotation: { x: 0, y: 0, z: 0, w: 1 }, translation: anchor }, thing.parentFromObject)
-    : thing.parentFromObject;
+/** Puts it where it is; undefined: nobody knows. */
+export function pose(group: THREE.Group, world: Rigid3 | undefined): void {
+  group.visible = world !== undefined;
+  if (!world) return;
   const p = threeFromWorld(world.translation);
   const q = threeOrientation(world);
   group.position.set(p.x, p.y, p.z);

@@ -4,7 +4,9 @@ import type { Camera } from '../geometry/camera';
 import { clipFromEye, pinholeAround } from '../geometry/pinhole';
 import type { View } from '../geometry/view';
 import type { SceneBook } from '../session/scene_book';
-import type { Vec3 } from '../geometry/vec3';
+import type { PlaceOf } from '../session/thing_place';
+import type { MarkerPose } from '../session/types';
+import { copied } from './scene_light';
 import { ThingMeshes } from './thing_meshes';
 
 const NEAR_M = 0.03;
@@ -45,23 +47,20 @@ export class SceneOverlay {
 
   constructor(
     private readonly book: SceneBook,
-    placeOf: (annotationId: string) => Vec3 | undefined,
+    placeOf: PlaceOf,
   ) {
     this.meshes = new ThingMeshes(book, placeOf, false);
     this.canvas.className = 'scene';
     this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, alpha: true });
     this.renderer.setClearColor(0x000000, 0);
     this.renderer.autoClear = true;
-    const light = new THREE.DirectionalLight(0xffffff, 2);
-    this.eye.add(light, light.target);
-    light.target.position.set(0, 0, -1);
-    this.scene.add(this.meshes.object, this.eye, new THREE.AmbientLight(0xffffff, 1.2));
+    this.scene.add(this.meshes.object, this.eye);
     this.eye.matrixAutoUpdate = true;
   }
 
   /** Draws what is seen from there; the canvas is hidden where there is nothing to draw. */
-  draw(view: View | undefined): void {
-    this.meshes.update();
+  draw(view: View | undefined, markers: readonly MarkerPose[]): void {
+    this.meshes.update(markers);
     const visible =
       view !== undefined && this.book.things.some(({ material }) => material !== 'real');
     this.canvas.hidden = !visible;
@@ -72,6 +71,9 @@ export class SceneOverlay {
     const q = threeOrientation(view.worldFromCamera);
     this.eye.position.set(p.x, p.y, p.z);
     this.eye.quaternion.set(q.x, q.y, q.z, q.w);
+    this.meshes.lightFor(this.eye);
+    const { rotation: r, translation: t } = view.worldFromCamera;
+    this.canvas.dataset['pose'] = [t.x, t.y, t.z, r.x, r.y, r.z, r.w].join(' '); // for tests
     this.renderer.setRenderTarget(this.target ?? null);
     this.renderer.render(this.scene, this.eye);
     if (!this.target) return;
@@ -95,10 +97,6 @@ export class SceneOverlay {
     if (lens.straight) return;
     const { width: w, height: h } = this.pinhole.intrinsics;
     this.target = new THREE.WebGLRenderTarget(w, h, { type: THREE.HalfFloatType });
-    const material = new THREE.MeshBasicMaterial({
-      map: this.target.texture,
-      blending: THREE.NoBlending, // premultiplied as it is
-    });
-    this.screen.add(new THREE.Mesh(bentGrid(lens, this.pinhole), material));
+    this.screen.add(new THREE.Mesh(bentGrid(lens, this.pinhole), copied(this.target.texture)));
   }
 }

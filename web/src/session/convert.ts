@@ -115,6 +115,9 @@ export function toPose(pb: PoseEvent): Pose {
     attempted: pb.featuresAttempted,
     matched: pb.featuresMatched,
     mapRevision: Number(pb.mapRevision),
+    markers: pb.markers.map(({ family, id, worldFromMarker }) => ({
+      ...{ family, id, worldFromMarker: toRigid3(worldFromMarker) },
+    })),
   };
 }
 

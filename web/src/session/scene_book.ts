@@ -1,5 +1,5 @@
 import type { Rigid3 } from '../geometry/rigid3';
-import type { Vec3 } from '../geometry/vec3';
+import { type Vec3, ZERO } from '../geometry/vec3';
 import {
   type GetModelResponse,
   type SceneEvent,
@@ -13,6 +13,23 @@ import { toRigid3, toVec3 } from './convert';
 /** As docs/scene.md has it. */
 export type Material = 'real' | 'virtual' | 'guide' | 'hidden';
 
+/** A square marker that a thing is fixed to. */
+export interface Marker {
+  readonly family: string;
+  readonly id: number;
+  readonly sideM: number; // of its black border
+}
+
+/**
+ * How light falls: a surface with the unit normal n is as bright as level * (1 + toward . n) times its colour.
+ * Of confidence 0: nothing is known.
+ */
+export interface Light {
+  readonly level: number;
+  readonly towardInWorld: Vec3;
+  readonly confidence: number; // 0 to 1
+}
+
 /** An object of the scene, in its own frame: x right, y down, z away, origin in the middle of its base. */
 export interface Thing {
   readonly id: string;
@@ -23,6 +40,7 @@ export interface Thing {
   readonly sizeM: Vec3;
   readonly scale: number;
   readonly annotationId: string; // whose place it moves with; empty: the world's
+  readonly marker: Marker | undefined; // that it moves with instead
   readonly parentFromObject: Rigid3;
   readonly colorRgba: number;
 }
@@ -68,6 +86,7 @@ export const toThing = (pb: SceneObject): Thing => ({
   sizeM: toVec3(pb.sizeM),
   scale: pb.scale || 1,
   annotationId: pb.annotationId,
+  marker: pb.marker && { family: pb.marker.family, id: pb.marker.id, sideM: pb.marker.sideM },
   parentFromObject: toRigid3(pb.parentFromObject),
   colorRgba: pb.colorRgba,
 });
@@ -81,10 +100,18 @@ export class SceneBook {
   things: readonly Thing[] = [];
   models: readonly Model[] = [];
   readonly files = new Map<string, Uint8Array>(); // GLB, by model
-  version = 0; // rises with each change
+  version = 0; // rises with each change but the light's
+  light: Light = { level: 1, towardInWorld: ZERO, confidence: 0 };
   private readonly fetching = new Set<string>();
+  private revision = 0n;
 
   apply(event: SceneEvent, calls: ModelCalls, sessionId: string): void {
+    if (event.light) {
+      const { level, towardInWorld, confidence } = event.light;
+      this.light = { level, towardInWorld: toVec3(towardInWorld), confidence };
+    }
+    if (!event.full && event.revision === this.revision) return; // the light alone
+    this.revision = event.revision;
     const kept = event.full ? [] : this.things;
     const changed = new Map(event.upserted.map((pb) => [pb.id, toThing(pb)]));
     const removed = new Set(event.removedIds);

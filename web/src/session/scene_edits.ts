@@ -23,6 +23,8 @@ export interface Touch {
 export interface Placed {
   readonly thing: Thing;
   readonly stop: Touch | undefined; // absent: it was not pushed
+  readonly slidM: number; // along what stopped it
+  readonly slideStop: Touch | undefined; // what it met while it slid
   readonly support: Touch;
 }
 
@@ -61,6 +63,7 @@ function toObject(draft: ThingDraft): MessageInitShape<typeof SceneObjectSchema>
   const { rotation: q, translation } = draft.parentFromObject;
   return {
     ...{ id: draft.id ?? '', name: draft.name, annotationId: draft.annotationId },
+    ...(draft.marker && { marker: draft.marker }),
     ...{ shape: SHAPES[draft.shape], material: MATERIALS[draft.material] },
     ...(draft.shape === 'model'
       ? { modelId: draft.modelId, scale: draft.scale }
@@ -90,29 +93,38 @@ export class SceneEdits {
     return this.undos.length > 0;
   }
 
-  /** Lets a thing go where it is, after a push if there is one; it is added where it has no id. */
-  async place(draft: ThingDraft, push?: Vec3): Promise<Placed> {
+  /**
+   * Lets a thing go where it is, after a push if there is one, of a hand that goes so far; it is added where it
+   * has no id.
+   */
+  async place(draft: ThingDraft, push?: Vec3, handM = 0): Promise<Placed> {
     const { clients } = this.session;
     const was = draft.id === undefined ? undefined : this.session.scene.thing(draft.id);
     const answer = await this.ask((sessionId) =>
       clients.scene.placeObject(
-        { sessionId, object: toObject(draft), ...(push && { pushInWorld: vector(push) }) },
+        { sessionId, object: toObject(draft), ...(push && { pushInWorld: vector(push), handM }) },
         TIMEOUT,
       ),
     );
-    const { object, stop, support } = answer;
+    const { object, stop, support, slidM, slideStop } = answer;
     if (!object) throw new EditError('the server sent no thing back');
     const thing = toThing(object);
     this.session.scene.put(thing);
     this.remember(was ? { was } : { addedId: thing.id });
-    return { thing, stop: stop && toTouch(stop), support: toTouch(support) };
+    return {
+      ...{ thing, stop: stop && toTouch(stop), slidM },
+      ...{ slideStop: slideStop && toTouch(slideStop), support: toTouch(support) },
+    };
   }
 
-  /** Adds a thing, or changes the one of its id; nothing stops it. */
-  async put(draft: ThingDraft): Promise<Thing> {
+  /**
+   * Adds a thing, or changes the one of its id; nothing stops it. `further`: part of the change before it, with
+   * which it is taken back.
+   */
+  async put(draft: ThingDraft, further = false): Promise<Thing> {
     const was = draft.id === undefined ? undefined : this.session.scene.thing(draft.id);
     const thing = await this.send(draft);
-    this.remember(was ? { was } : { addedId: thing.id });
+    if (!further) this.remember(was ? { was } : { addedId: thing.id });
     return thing;
   }
 

@@ -27,6 +27,13 @@ export type Role = 'expert' | 'wearer' | 'viewer';
 export type View = 'raw' | 'augmented';
 
 /** The camera at one frame. Frame ids fit a number: 2^53 frames are nine million years. */
+/** Where a marker that moves is: x right, y up, z towards who looks at it. */
+export interface MarkerPose {
+  readonly family: string;
+  readonly id: number;
+  readonly worldFromMarker: Rigid3;
+}
+
 export interface Pose {
   readonly frameId: number;
   readonly status: TrackingStatus;
@@ -37,6 +44,7 @@ export interface Pose {
   readonly attempted: number;
   readonly matched: number;
   readonly mapRevision: number;
+  readonly markers: readonly MarkerPose[]; // that things of the scene are fixed to
 }
 
 /** True where the pose is an estimate of this frame's own, not the last one before tracking was lost. */

@@ -132,3 +132,39 @@ export function boxOf(a: Vec3, b: Vec3, rotation: Quaternion): Measured | string
   const translation = { ...mix(a, b, 0.5), y: Math.max(a.y, b.y) };
   return { pose: { rotation, translation }, sizeM };
 }
+
+/** Points of a room that were clicked. */
+export interface RoomPoints {
+  readonly floor: Vec3;
+  readonly wall: readonly [Vec3, Vec3]; // of one wall
+  readonly sides: readonly [Vec3, Vec3]; // one of each of the walls beside it
+  readonly opposite: Vec3;
+}
+
+const LEAST_ROOM_M = 0.5;
+
+/** The room whose floor and four walls go through these points. Why there is none, in words. */
+export function roomOf(points: RoomPoints, heightM: number): Measured | string {
+  const [a, b] = points.wall;
+  const along = { ...subtract(b, a), y: 0 };
+  if (norm(along) < 0.1) {
+    return 'the two points of the wall lie above each other; click one farther to the side';
+  }
+  const line = normalise(along);
+  const across = cross(line, DOWN);
+  // Away from whoever stands in the room, before the wall.
+  const sign = dot(across, subtract(points.opposite, a)) > 0 ? -1 : 1;
+  const [x, z] = [scale(line, sign), scale(across, sign)];
+  const sides = points.sides.map((point) => dot(x, point));
+  const [low, high] = [Math.min(...sides), Math.max(...sides)];
+  const [near, far] = [dot(z, points.opposite), (dot(z, a) + dot(z, b)) / 2];
+  if (high - low < LEAST_ROOM_M || far - near < LEAST_ROOM_M) {
+    const least = millimetres(Math.min(high - low, far - near));
+    return `two opposite walls would be ${least} apart; click one point on each wall`;
+  }
+  const middle = add(scale(x, (low + high) / 2), scale(z, (near + far) / 2));
+  return {
+    pose: { rotation: facing(z), translation: { ...middle, y: points.floor.y } },
+    sizeM: { x: high - low, y: heightM, z: far - near },
+  };
+}

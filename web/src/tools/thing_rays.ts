@@ -1,6 +1,7 @@
 import { conjugate, inverse, rotate, transform } from '../geometry/rigid3';
 import { add, scale, type Vec3 } from '../geometry/vec3';
 import type { Model, Thing } from '../session/scene_book';
+import { isFixed } from '../session/thing_place';
 
 export interface Ray {
   readonly originInWorld: Vec3;
@@ -70,9 +71,9 @@ const nearest = (hits: readonly (Hit | undefined)[]): Hit | undefined =>
 export const hitSurface = (things: readonly Thing[], ray: Ray): Hit | undefined =>
   nearest(
     things
-      .filter(({ shape, material, annotationId }) => {
-        const solid = material === 'real' || material === 'virtual';
-        return solid && shape !== 'model' && annotationId === '';
+      .filter((thing) => {
+        const solid = thing.material === 'real' || thing.material === 'virtual';
+        return solid && thing.shape !== 'model' && !isFixed(thing);
       })
       .map((thing) => hitOne(thing, ray, thing.sizeM)),
   );
@@ -85,7 +86,7 @@ export const pickThing = (
 ): Thing | undefined =>
   nearest(
     things
-      .filter(({ shape, annotationId }) => shape !== 'room' && annotationId === '')
+      .filter((thing) => thing.shape !== 'room' && !isFixed(thing))
       .map((thing) => hitOne(thing, ray, sizeOf(thing, models))),
   )?.thing;
 

@@ -104,7 +104,7 @@ export class App {
     const aim = new Aim(session, state, this.map, this.video);
     const measuring = new Measuring(session, edits, state);
     const things = new Things(session, state, aim);
-    this.thingsPanel = new ThingsPanel(session, state, things);
+    this.thingsPanel = new ThingsPanel(session, state, things, aim);
     things.focus = () => this.thingsPanel.focus();
     const dialogs = { list: new ListDialog(), picture: new PictureDialog() };
     const controller = new Controller(session, edits, state, {

@@ -69,7 +69,7 @@ export class Controller implements ToolActions, AnnotationActions {
         });
         break;
       case 'delete':
-        if (state.tool === 'thing') this.with_.things.remove();
+        if (state.tool === 'thing') this.with_.things.moves.remove();
         else this.with_.selected.remove();
         break;
       case 'copy':

@@ -76,7 +76,9 @@ export class Grips {
     const { things: all, models } = session.scene;
     const picked = spot && pickThing(all, models, spot.ray);
     if (!picked || picked.id !== state.thingId || !this.may(pane)) return undefined;
-    return new ThingDrag(session, state, aim, pane, picked, (way) => things.pushTowards(way));
+    return new ThingDrag(session, state, aim, pane, picked, (way, handM) =>
+      things.moves.pushTowards(way, handM),
+    );
   }
 
   private laser(pane: PaneName, { x, y }: Press): Drag {

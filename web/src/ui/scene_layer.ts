@@ -1,6 +1,7 @@
 import type { View } from '../geometry/view';
 import type { SceneOverlay } from '../scene/scene_overlay';
 import type { Session } from '../session/session';
+import type { MarkerPose } from '../session/types';
 import { h } from './dom';
 
 /** The scene over the live picture. three.js is loaded when there is first something to draw. */
@@ -11,12 +12,12 @@ export class SceneLayer {
 
   constructor(private readonly session: Session) {}
 
-  /** What is seen from there, where the picture lies (CSS). */
-  draw(view: View | undefined, transform: string): void {
+  /** What is seen from there, where the picture lies (CSS); `markers` as that very picture shows them. */
+  draw(view: View | undefined, markers: readonly MarkerPose[], transform: string): void {
     const needed = this.session.scene.things.some(({ material }) => material !== 'real');
     if (needed) void this.load();
     if (this.element.style.transform !== transform) this.element.style.transform = transform;
-    this.overlay?.draw(view);
+    this.overlay?.draw(view, markers);
     this.element.dataset['things'] = String(this.session.scene.things.length); // for tests
   }
 

@@ -1,4 +1,4 @@
-import { add, dot, scale, subtract, type Vec3 } from '../geometry/vec3';
+import { add, distance, dot, scale, subtract, type Vec3 } from '../geometry/vec3';
 import { eyeOf, rayOf } from '../geometry/view';
 import { DEFAULT_SIZE_M } from '../session/edits';
 import type { Thing } from '../session/scene_book';
@@ -9,12 +9,15 @@ import type { Aim } from './aim';
 import type { AppState, PaneName } from './app_state';
 import type { Drag } from './drag';
 
+const MOST_HAND_M = 20; // PlaceSceneObjectRequest
+
 /** Pulls a thing the way it is to be pushed along the floor; a line says which. */
 export class ThingDrag implements Drag {
   readonly clicks = true;
   private readonly pendingId = newUuid();
   private first: Vec3 | undefined; // where it was taken hold of, as high as its base
   private way: Vec3 | undefined;
+  private handM = 0;
 
   constructor(
     private readonly session: Session,
@@ -22,7 +25,7 @@ export class ThingDrag implements Drag {
     private readonly aim: Aim,
     private readonly pane: PaneName,
     private readonly thing: Thing,
-    private readonly push: (way: Vec3) => void,
+    private readonly push: (way: Vec3, handM: number) => void,
   ) {}
 
   move(x: number, y: number): void {
@@ -30,6 +33,7 @@ export class ThingDrag implements Drag {
     const under = this.onFloor(x, y, from);
     this.first ??= under;
     this.way = under && this.first && wayBetween(this.first, under);
+    this.handM = under && this.first ? Math.min(distance(this.first, under), MOST_HAND_M) : 0;
     if (!under || !this.first) return;
     const to = add(from, subtract(under, this.first));
     this.session.annotations.addPending({
@@ -53,7 +57,7 @@ export class ThingDrag implements Drag {
     this.move(x, y);
     const { way } = this;
     this.cancel();
-    if (way) this.push(way);
+    if (way) this.push(way, this.handM);
     else this.state.refuse(this.pane, 'Not pushed: drag it along the floor, the way it is to go.');
   }
 

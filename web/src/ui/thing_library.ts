@@ -7,7 +7,12 @@ const nameOf = (path: string): string => path.slice(path.lastIndexOf('/') + 1, -
 
 const URLS = new Map(Object.entries(FILES).map(([path, url]) => [nameOf(path), url]));
 
-export const LIBRARY: readonly string[] = [...URLS.keys()].sort();
+/** Shown through what it lies in, not placed on a floor. */
+export const SHOWN_INSIDE: readonly string[] = ['inside'];
+
+export const LIBRARY: readonly string[] = [...URLS.keys()]
+  .filter((name) => !SHOWN_INSIDE.includes(name))
+  .sort();
 
 /** Its GLB file. */
 export async function libraryFile(name: string): Promise<Uint8Array> {

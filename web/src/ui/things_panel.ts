@@ -1,9 +1,13 @@
 import type { Session } from '../session/session';
 import { turnDeg, type Way } from '../tools/thing_places';
+import type { Aim } from './aim';
 import type { AppState } from './app_state';
 import { h, isTextField, setAttribute, setClass, setText } from './dom';
 import { whyNotEdit } from './rights';
-import { LIBRARY } from './thing_library';
+import { LIBRARY, SHOWN_INSIDE } from './thing_library';
+import type { ThingMarker } from './thing_marker';
+import { ThingNumbers } from './thing_numbers';
+import { OVERLAYS } from './thing_overlays';
 import { LEAST_PAIRS } from './thing_register';
 import type { ThingClick, Things } from './things';
 
@@ -18,21 +22,31 @@ const ACTS: readonly [ThingClick, string][] = [
   ['move', 'moves the selected thing there'],
   ['plane', 'marks a plane: 3 points'],
   ['box', 'marks a box: 2 corners'],
+  ['room', 'marks a room: 6 points'],
   ['register', 'registers the selected: 4 points'],
 ];
+
+const FLAT_M = 1e-4; // of a picture
 
 /** Things of the scene: what a click does, what there is, where it stands, and how it is pushed. */
 export class ThingsPanel {
   readonly element: HTMLElement;
   private readonly does = h('select', { 'aria-label': 'A click' });
   private readonly against = h('select', { 'aria-label': 'On' });
-  private readonly file = h('input', { type: 'file', accept: '.glb', class: 'hidden' });
+  private readonly file = h('input', {
+    type: 'file',
+    accept: '.glb,image/png,image/jpeg,image/webp',
+    class: 'hidden',
+  });
   private readonly said = h('p', { class: 'said', role: 'status' });
   private readonly list = h('ul', { 'aria-label': 'Things of the scene' });
   private readonly place = h('p', { class: 'place number' });
   private readonly pairs = h('ol', { 'aria-label': 'Points clicked' });
   private readonly total = h('p', { class: 'total number', role: 'status' });
   private readonly accept = h('button', { type: 'button' }, 'Accept');
+  private readonly done = h('button', { type: 'button' }, 'Done');
+  private readonly numbers: ThingNumbers;
+  private readonly marker: ThingMarker;
   private readonly moves = h('div', { class: 'moves', role: 'group' });
   private listed = '';
   private optioned = '';
@@ -41,8 +55,11 @@ export class ThingsPanel {
     private readonly session: Session,
     private readonly state: AppState,
     private readonly things: Things,
+    aim: Aim,
   ) {
-    const open = this.button('GLB file…', () => this.file.click());
+    this.numbers = new ThingNumbers(session, aim, things);
+    this.marker = things.marker;
+    const open = this.button('File…', () => this.file.click());
     this.against.append(
       h('option', { value: 'floor' }, 'floor'),
       h('option', { value: 'wall' }, 'wall'),
@@ -56,12 +73,15 @@ export class ThingsPanel {
       h('label', {}, h('span', {}, 'On the'), this.against, open),
       this.file,
       this.said,
+      this.done,
       this.pairs,
       this.total,
       this.accept,
       this.list,
       this.place,
       this.moves,
+      this.numbers.element,
+      this.marker.element,
     );
     this.listen();
   }
@@ -76,15 +96,15 @@ export class ThingsPanel {
     const { things, moves } = this;
     moves.setAttribute('aria-label', 'Push, turn, delete the selected thing');
     for (const { way, shown, key } of WAYS) {
-      const button = this.button(shown, () => things.push(way), `Push ${way}`);
+      const button = this.button(shown, () => things.moves.push(way), `Push ${way}`);
       button.setAttribute('aria-keyshortcuts', key);
       button.title = `push it ${way} until it touches; then it is lowered until it rests`;
       moves.append(button);
     }
     moves.append(
-      this.button('↺', () => things.turn(-1), 'Turn left'),
-      this.button('↻', () => things.turn(1), 'Turn right'),
-      this.button('Delete', () => things.remove()),
+      this.button('↺', () => things.moves.turn(-1), 'Turn left'),
+      this.button('↻', () => things.moves.turn(1), 'Turn right'),
+      this.button('Delete', () => things.moves.remove()),
       this.button('Undo', () => things.undo()),
     );
   }
@@ -102,11 +122,12 @@ export class ThingsPanel {
       file.value = '';
     });
     accept.addEventListener('click', () => things.accept());
+    this.done.addEventListener('click', () => things.finish());
     this.element.addEventListener('keydown', (event) => {
       const way = WAYS.find(({ key }) => key === event.key)?.way;
       if (!way || isTextField(event.target)) return;
       event.preventDefault();
-      if (!event.repeat) things.push(way);
+      if (!event.repeat) things.moves.push(way);
     });
   }
 
@@ -122,6 +143,9 @@ export class ThingsPanel {
     const why = whyNotEdit(session);
     this.updateChoices();
     if (this.does.value !== things.clickDoes) this.does.value = things.clickDoes;
+    setClass(this.done, 'hidden', !things.hasWay);
+    this.numbers.update();
+    this.marker.update();
     setText(this.said, why ?? things.said.text);
     setClass(this.said, 'warn', why !== undefined || things.said.warn);
     this.updateList();
@@ -140,10 +164,20 @@ export class ThingsPanel {
     const option = (value: string, text: string): HTMLElement => h('option', { value }, text);
     const library = h('optgroup', { label: 'Places, of the library' });
     library.append(...LIBRARY.map((name) => option(`library ${name}`, `places a ${name}`)));
-    const own = models.filter(({ name }) => !LIBRARY.includes(name));
+    const laid = h('optgroup', { label: 'Explains' });
+    laid.append(...OVERLAYS.map(([kind, text]) => option(kind, text)));
+    laid.append(
+      ...SHOWN_INSIDE.map((name) => option(`inside ${name}`, `shows a cabinet's ${name}`)),
+      ...models
+        .filter(({ sizeM }) => sizeM.z < FLAT_M)
+        .map(({ id, name }) => option(`inside ${id}`, `shows ${name}`)),
+    );
+    const built = [...LIBRARY, ...SHOWN_INSIDE, ...OVERLAYS.map(([kind]) => kind)] as string[];
+    const own = models.filter(({ name, sizeM }) => sizeM.z >= FLAT_M && !built.includes(name));
     const uploaded = h('optgroup', { label: 'Places, of this server' });
     uploaded.append(...own.map(({ id, name }) => option(`model ${id}`, `places ${name}`)));
-    this.does.replaceChildren(...ACTS.map(([value, text]) => option(value, text)), library);
+    const acts = ACTS.map(([value, text]) => option(value, text));
+    this.does.replaceChildren(...acts, library, laid);
     if (own.length > 0) this.does.append(uploaded);
   }
 
@@ -182,7 +216,8 @@ export class ThingsPanel {
     )
       .map(([axis, value]) => `${axis} ${(Math.abs(value) < 5e-5 ? 0 : value).toFixed(4)}`)
       .join('  ');
-    setText(this.place, `${thing.name}: ${at} ${unit}, ${turn}`);
+    const on = thing.marker ? ` on ${thing.marker.family} ${thing.marker.id}` : '';
+    setText(this.place, `${thing.name}${on}: ${at} ${unit}, ${turn}`);
   }
 
   private updateRegister(): void {

@@ -149,7 +149,8 @@ export class VideoPane extends Pane {
     this.painter.begin(this.size, layout);
     this.painter.clip(layout.width, layout.height);
     const current = this.current();
-    this.scene.draw(current?.view, this.player.canvas.style.transform);
+    const markers = current?.facts.pose?.markers ?? [];
+    this.scene.draw(current?.view, markers, this.player.canvas.style.transform);
     if (current?.view) this.drawFrame(current.facts, current.view);
     this.painter.end();
     this.took(performance.now() - begin);

@@ -10,15 +10,17 @@ import { barriers } from './axe.mjs';
 import { Expert } from './expert.mjs';
 import { inCamera, inWorld, length, minus } from './optics.mjs';
 import { startServer } from './server.mjs';
+import { occluded } from './things_occlusion.mjs';
+import { explained, numbered, slid } from './things_more.mjs';
 import { asViewer } from './together.mjs';
 
-const CONTACT_M = 1e-3;
+export const CONTACT_M = 1e-3;
 const SHELF_M = [1, 1.8, 0.3];
 // The simulator's room about its chessboard: WorldFromRoom in server/sim/wearer.cpp.
 const ROOM = { size: [4, 2.5, 4], base: [0.16, 1.22, -1.992] };
-const WALL_Z = 0.008;
-const LEFT_X = -1.84;
-const FLOOR_Y = 1.22;
+export const WALL_Z = 0.008;
+export const LEFT_X = -1.84;
+export const FLOOR_Y = 1.22;
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -40,15 +42,20 @@ export async function runThings({ server: binary, chromium, seed, shots, folder 
     const session = createClient(SessionService, transport);
     const joined = await session.join({ displayName: 'test', role: Role.EXPERT });
     context.sessionId = joined.sessionId;
+    context.intrinsics = joined.intrinsics;
     context.ann = await Expert.open(chromium, `${server.http}/?name=Ann`);
     await context.ann.waitForStatus(/^tracking/, 60_000);
     await context.ann.page.locator('canvas.map[data-eye]').waitFor();
     await room(context);
+    await occluded(context);
     await pushed(context);
     await refused(context);
     await dragged(context);
+    await slid(context);
     await undone(context);
     await dropped(context);
+    await explained(context);
+    await numbered(context);
     await barrier(context);
     await viewer(context);
     const { errors } = context.ann;
@@ -60,11 +67,11 @@ export async function runThings({ server: binary, chromium, seed, shots, folder 
   return context.failures;
 }
 
-const shot = async ({ ann, shots }, name) => {
+export const shot = async ({ ann, shots }, name) => {
   if (shots) await ann.page.screenshot({ path: join(shots, `things-${name}.png`) });
 };
 
-async function when(found, timeoutMs = 10_000) {
+export async function when(found, timeoutMs = 10_000) {
   for (const end = Date.now() + timeoutMs; Date.now() < end; await sleep(60)) {
     const result = await found();
     if (result) return result;
@@ -72,15 +79,17 @@ async function when(found, timeoutMs = 10_000) {
   return undefined;
 }
 
-const panel = ({ ann }) => ann.page.locator('section.things');
-const said = (context) => panel(context).locator('.said').innerText();
+export const panel = ({ ann }) => ann.page.locator('section.things');
+export const said = (context) => panel(context).locator('.said').innerText();
 const place = (context) => panel(context).locator('.place').innerText();
-const objects = async ({ scene, sessionId }) => (await scene.listScene({ sessionId })).objects;
-const xyz = ({ parentFromObject: { translationM: t } }) => [t.x, t.y, t.z];
-const does = (context, value) => panel(context).locator('select').first().selectOption(value);
+export const objects = async ({ scene, sessionId }) =>
+  (await scene.listScene({ sessionId })).objects;
+export const xyz = ({ parentFromObject: { translationM: t } }) => [t.x, t.y, t.z];
+export const does = (context, value) =>
+  panel(context).locator('select').first().selectOption(value);
 
 /** Where a point of the world appears on the page in the map. */
-async function inMap({ ann }, point) {
+export async function inMap({ ann }, point) {
   const { pose, focal, left, top, width, height } = await ann.mapView();
   const [a, b, c] = inCamera(pose, point);
   return [left + width / 2 + (focal * a) / c, top + height / 2 + (focal * b) / c];
@@ -126,13 +135,13 @@ async function room(context) {
 }
 
 /** Until the panel says something like this; what it says. */
-async function says(context, pattern, timeoutMs = 12_000) {
+export async function says(context, pattern, timeoutMs = 12_000) {
   await when(async () => pattern.test(await said(context)), timeoutMs);
   return said(context);
 }
 
 /** Corners of the shelf as the server has it. */
-function cornersOf({ parentFromObject: { rotation: q, translationM: t } }) {
+export function cornersOf({ parentFromObject: { rotation: q, translationM: t } }) {
   const pose = { rotation_xyzw: [q.x, q.y, q.z, q.w], translation_m: [t.x, t.y, t.z] };
   return [0, 1, 2, 3, 4, 5, 6, 7].map((i) =>
     inWorld(pose, [
@@ -143,8 +152,9 @@ function cornersOf({ parentFromObject: { rotation: q, translationM: t } }) {
   );
 }
 
-const mm = (m) => `${(1000 * m).toFixed(2)} mm`;
-const shelfOf = async (context) => (await objects(context)).find(({ name }) => name === 'shelf');
+export const mm = (m) => `${(1000 * m).toFixed(2)} mm`;
+export const shelfOf = async (context) =>
+  (await objects(context)).find(({ name }) => name === 'shelf');
 
 async function pushed(context) {
   const { ann, check } = context;

@@ -74,6 +74,7 @@ describe('words in the picture of a camera that is lost', () => {
     attempted: 0,
     matched: 0,
     mapRevision: 1,
+    markers: [],
   });
 
   it('say what to do, and nothing while it is tracked', () => {

@@ -13,6 +13,8 @@ import { distance, ZERO } from '../../src/geometry/vec3';
 import { type ModelCalls, SceneBook, type Thing } from '../../src/session/scene_book';
 import { beforeWall, boxOf, facing, planeOf, turnDeg } from '../../src/tools/thing_places';
 import { cornersOf, hitSurface, pickThing } from '../../src/tools/thing_rays';
+import { contactShadows } from '../../src/scene/contact_shadow';
+import { worldFromThing } from '../../src/session/thing_place';
 
 const LENS = new Camera({
   model: 'brown_conrady',
@@ -110,7 +112,7 @@ describe('the book of the scene', () => {
 
 const thing = (more: Partial<Thing>): Thing => ({
   ...{ id: 'r', name: 'room', shape: 'room', material: 'real', modelId: '', scale: 1 },
-  ...{ sizeM: { x: 4, y: 2.5, z: 4 }, annotationId: '', colorRgba: 0 },
+  ...{ sizeM: { x: 4, y: 2.5, z: 4 }, annotationId: '', marker: undefined, colorRgba: 0 },
   ...{ parentFromObject: IDENTITY, ...more },
 });
 
@@ -189,5 +191,68 @@ describe('where things come to stand', () => {
       expect(Math.min(...corners.map((corner) => distance(corner, clicked)))).toBeCloseTo(0, 9);
     }
     expect(boxOf(a, { ...b, y: 0 }, rotation)).toMatch(/0 mm high/);
+  });
+});
+
+describe('what things are fixed to', () => {
+  const drawer = thing({
+    marker: { family: 'apriltag36h11', id: 3, sideM: 0.08 },
+    parentFromObject: { ...IDENTITY, translation: { x: 0, y: 0, z: -0.2 } },
+  });
+  const marker = (id: number) => ({
+    ...{ family: 'apriltag36h11', id },
+    worldFromMarker: {
+      rotation: { x: 1, y: 0, z: 0, w: 0 }, // half a turn about x
+      translation: { x: 1, y: 2, z: 3 },
+    },
+  });
+
+  it('a marker carries them; one that was not seen leaves them nowhere', () => {
+    const at = worldFromThing(drawer, () => undefined, [marker(2), marker(3)]);
+    expect(at?.translation).toEqual({ x: 1, y: 2, z: 3.2 });
+    expect(worldFromThing(drawer, () => undefined, [marker(2)])).toBeUndefined();
+  });
+
+  it('an annotation does so too, without its turn; the rest stands in the world', () => {
+    const fixed = thing({ annotationId: 'a' });
+    expect(worldFromThing(fixed, () => ({ x: 1, y: 0, z: 0 }), [])?.translation.x).toBe(1);
+    expect(worldFromThing(fixed, () => undefined, [])).toBeUndefined();
+    expect(worldFromThing(thing({}), () => undefined, [])).toEqual(IDENTITY);
+  });
+
+  it('no ray stops at what moves', () => {
+    const ray = { originInWorld: { x: 0, y: -1, z: 0 }, directionInWorld: { x: 0, y: 1, z: 0 } };
+    expect(hitSurface([thing({})], ray)?.pointInWorld.y).toBeCloseTo(0, 12);
+    expect(hitSurface([drawer], ray)).toBeUndefined();
+  });
+});
+
+describe('contact shadows', () => {
+  const quad = (x0: number, x1: number, z0: number, z1: number, y: number) =>
+    [
+      ...[[x0, z0] as const, [x1, z0] as const, [x1, z1] as const],
+      ...[[x0, z0] as const, [x1, z1] as const, [x0, z1] as const],
+    ].map(([x, z]) => ({ x, y, z }));
+  const foot = { material: 'virtual', corners: quad(-0.3, 0.3, -0.2, 0.2, -0.0002) } as const;
+
+  it('are dark under a foot, gone beside it, and fall only on what is there', () => {
+    const floor = { material: 'real', corners: quad(-2, 0.31, -2, 2, 0) } as const;
+    const { positions, darkness, triangles } = contactShadows([foot, floor]);
+    expect(triangles.length).toBeGreaterThan(100);
+    expect(Math.max(...darkness)).toBe(0.5);
+    positions.forEach(({ x, y, z }, i) => {
+      expect(y).toBeCloseTo(-0.0022, 9);
+      const away = Math.hypot(Math.max(0, Math.abs(x) - 0.3), Math.max(0, Math.abs(z) - 0.2));
+      expect(away).toBeLessThan(0.0801);
+      if (x > 0.311 || away > 0.0799) expect(darkness[i]).toBe(0); // beside the floor; the rim's end
+      if (away < 1e-9 && x <= 0.3) expect(darkness[i]).toBe(0.5);
+    });
+  });
+
+  it('need something that holds', () => {
+    expect(Math.max(...contactShadows([foot]).darkness)).toBe(0);
+    const guide = { material: 'guide', corners: quad(-2, 2, -2, 2, 0) } as const;
+    expect(Math.max(...contactShadows([foot, guide]).darkness)).toBe(0);
+    expect(contactShadows([guide]).triangles).toEqual([]);
   });
 });

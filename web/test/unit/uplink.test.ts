@@ -256,6 +256,7 @@ describe('statusWords', () => {
     attempted: 9,
     matched: 9,
     mapRevision: 1,
+    markers: [],
   };
   it('does not say tracking while no picture comes', () => {
     const input = { link: { kind: 'live' }, pose, sourceEnded: false, nowMs: 10_000 } as const;

@@ -255,5 +255,43 @@ TEST(Latency, StagesSumToTheWholeAndNeedTheClock) {
   EXPECT_EQ(meter.Get(Stage::kTotal)->p50, 24);
 }
 
+TEST(State, KeepsTheSceneAsItIsToldAndItsLightApart) {
+  State state;
+  net::SceneChange first;
+  first.revision = 4;
+  first.full = true;
+  first.upserted.resize(2);
+  first.upserted[0].id = "a";
+  first.upserted[1].id = "b";
+  state.Apply(first, 0);
+  const std::uint64_t version = state.scene.version();
+  EXPECT_EQ(state.scene.scene().objects.size(), 2u);
+  net::SceneChange lit;
+  lit.revision = 4;
+  lit.light = {0.7, Eigen::Vector3d(0, -0.4, 0), 0.9};
+  state.Apply(lit, 0);
+  EXPECT_EQ(state.scene.light().level, 0.7);
+  EXPECT_EQ(state.scene.version(), version);  // nothing is uploaded anew
+  net::SceneChange moved = lit;
+  moved.revision = 5;
+  moved.upserted.resize(1);
+  moved.upserted[0].id = "b";
+  moved.upserted[0].parent_from_object.translation.x() = 2;
+  moved.removed_ids = {"a"};
+  state.Apply(moved, 0);
+  ASSERT_EQ(state.scene.scene().objects.size(), 1u);
+  EXPECT_EQ(state.scene.scene().objects[0].parent_from_object.translation.x(), 2);
+  EXPECT_GT(state.scene.version(), version);
+  const auto model = std::make_shared<SceneModel>();
+  model->id = "m";
+  state.scene.Add(model);
+  state.scene.Add(model);
+  EXPECT_EQ(state.scene.scene().models.size(), 1u);
+  first.upserted.clear();
+  state.Apply(first, 0);
+  EXPECT_TRUE(state.scene.scene().objects.empty());
+  EXPECT_EQ(state.scene.scene().models.size(), 1u);  // models are what their ids say
+}
+
 }  // namespace
 }  // namespace saccade::session::session_state_test

@@ -185,6 +185,50 @@ TEST(Subscription, SceneIsAllOfItFirstAndThenWhatChanged) {
   EXPECT_FALSE(subscription.Next(0, event));
 }
 
+TEST(Subscription, TheLightIsToldWhenSomebodyWouldSeeIt) {
+  Subscription subscription(Topics({v1::TOPIC_SCENE}));
+  Scene scene;
+  scene.revision = 1;
+  subscription.OfferScene(std::make_shared<const Scene>(scene));
+  v1::Event event;
+  ASSERT_TRUE(subscription.Next(0, event));
+  EXPECT_EQ(event.scene().light().confidence(), 0);
+  const auto lit = [&](double level) {
+    NumberedState state;
+    state.tracked.snapshot = std::make_shared<const MapSnapshot>();
+    state.tracked.light = {level, Eigen::Vector3d(0, -0.4, 0), 0.8};
+    subscription.Offer(state);
+  };
+  lit(0.7);
+  ASSERT_TRUE(subscription.Next(0, event));
+  EXPECT_FALSE(event.scene().full());
+  EXPECT_EQ(event.scene().revision(), 1u);
+  EXPECT_EQ(event.scene().light().level(), 0.7);
+  EXPECT_EQ(event.scene().light().toward_in_world().y(), -0.4);
+  lit(0.71);
+  EXPECT_FALSE(subscription.Next(0, event));
+  lit(0.75);
+  ASSERT_TRUE(subscription.Next(0, event));
+  EXPECT_EQ(event.scene().light().level(), 0.75);
+  EXPECT_FALSE(subscription.Next(0, event));
+}
+
+TEST(EventBytes, APoseTellsWhereMarkersAre) {
+  TrackedEvent tracked;
+  tracked.snapshot = std::make_shared<const MapSnapshot>();
+  const Rigid3 place{Eigen::Quaterniond(0, 1, 0, 0), {1, 2, 3}};
+  tracked.markers = std::make_shared<const std::vector<MarkerPose>>(
+      std::vector<MarkerPose>{{"apriltag36h11", 3, place, 77}});
+  v1::PoseEvent pose;
+  ASSERT_TRUE(pose.ParseFromString(*EventBytes().Pose(tracked)));
+  ASSERT_EQ(pose.markers_size(), 1);
+  EXPECT_EQ(pose.markers(0).family(), "apriltag36h11");
+  EXPECT_EQ(pose.markers(0).id(), 3u);
+  EXPECT_EQ(pose.markers(0).seen_ns(), 77);
+  EXPECT_EQ(pose.markers(0).world_from_marker().translation_m().z(), 3);
+  EXPECT_EQ(pose.markers(0).world_from_marker().rotation().x(), 1);
+}
+
 TEST(Subscription, WhilePausedNoPictureLeavesAndThenAKeyFrameIsFirst) {
   Subscription subscription(Topics({v1::TOPIC_VIDEO, v1::TOPIC_PICTURE_PAUSE}));
   const auto paused = std::make_shared<const PicturePause>(PicturePause{true, "Ann", 5});

@@ -68,7 +68,7 @@ TEST_P(ShippedModel, IsPushedToTheWallAndSinksToTheFloor) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedModel,
                          ::testing::Values("shelf", "desk", "pipe", "valve", "crate", "arrow",
-                                           "divider", "person"));
+                                         "divider", "person", "inside"));
 
 TEST(ShippedModels, AreWhatTheScriptWrites) {
   const std::filesystem::path out = std::filesystem::path(::testing::TempDir()) /
@@ -81,7 +81,7 @@ TEST(ShippedModels, AreWhatTheScriptWrites) {
     ++files;
     EXPECT_EQ(Bytes(entry.path()), Bytes(out / entry.path().filename())) << entry.path();
   }
-  EXPECT_EQ(files, 8);
+  EXPECT_EQ(files, 9);
 }
 
 }  // namespace

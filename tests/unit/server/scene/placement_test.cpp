@@ -54,6 +54,47 @@ TEST(Place, OnTheFloorItIsPushedToTheWall) {
   EXPECT_NEAR(placed->stop->moved_m, 1.8 - kContactGap_m, 1e-6);
 }
 
+TEST(Place, AslantIntoAWallItSlidesAsFarAsTheHandGoes) {
+  PlacementRequest request = From({0, 0, 0}, Vector3d(1, 0, 0.5));
+  request.hand_m = 2.5;
+  const auto placed = Place(CollisionScene(Room()), Crate(), request);
+  ASSERT_TRUE(placed.ok()) << placed.status();
+  // At the wall x = 2 after 1.8 m along x, and as far along z as the hand.
+  const Vector3d way = Vector3d(1, 0, 0.5).normalized();
+  EXPECT_NEAR(placed->world_from_body.translation.x(), 2 - 0.2, 1e-3);
+  EXPECT_NEAR(placed->world_from_body.translation.z(), 2.5 * way.z(), 1e-3);
+  EXPECT_NEAR(placed->world_from_body.translation.y(), -kContactGap_m, 1e-6);
+  EXPECT_NEAR(placed->stop->normal_in_world.x(), -1, 1e-6);
+  EXPECT_NEAR(placed->slid_m, 2.5 * way.z() - 1.8 * way.z() / way.x(), 1e-3);
+  EXPECT_FALSE(placed->slide_stop);
+}
+
+TEST(Place, ItSlidesIntoACornerAndStaysThere) {
+  std::vector<Obstacle> obstacles = Room();
+  obstacles.push_back(At("post", BoxMesh({0.2, 1, 0.2}, kGrey), {1.9, 0, 1.2}));
+  for (const bool post : {false, true}) {
+    PlacementRequest request = From({0, 0, 0}, Vector3d(1, 0, 0.5));
+    request.hand_m = 12;
+    const auto placed = Place(CollisionScene(post ? obstacles : Room()), Crate(), request);
+    ASSERT_TRUE(placed.ok()) << placed.status();
+    EXPECT_NEAR(placed->world_from_body.translation.x(), 2 - 0.2, 1e-3);
+    EXPECT_NEAR(placed->world_from_body.translation.z(), (post ? 1.1 : 2.0) - 0.1, 1e-3);
+    ASSERT_TRUE(placed->slide_stop);
+    EXPECT_EQ(placed->slide_stop->obstacle_name, post ? "post" : "room");
+  }
+}
+
+TEST(Place, HeadOnItDoesNotSlide) {
+  PlacementRequest request = From({0, 0, 0}, Vector3d(1, 0, 0.01));
+  request.hand_m = 5;
+  auto placed = Place(CollisionScene(Room()), Crate(), request);
+  ASSERT_TRUE(placed.ok()) << placed.status();
+  EXPECT_EQ(placed->slid_m, 0);
+  request.hand_m = -1;
+  EXPECT_THAT(Place(CollisionScene(Room()), Crate(), request).status().message(),
+              HasSubstr("hand_m: -1; give"));
+}
+
 TEST(Place, ThroughAThinSheetNothingPasses) {
   std::vector<Obstacle> obstacles = Room();
   const Eigen::Quaterniond upright(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitZ()));

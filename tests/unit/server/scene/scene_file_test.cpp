@@ -62,7 +62,7 @@ TEST_F(SceneFile, IsReadAndWrittenTheSame) {
   const absl::StatusOr<SceneContents> scene = ParseScene(R"({"objects": [
       {"name": "room", "shape": "room", "size_m": [4, 2.5, 4]},
       {"name": "drawer", "shape": "model", "model": "part.glb", "scale": 2, "material": "virtual",
-       "marker": {"family": "apriltag36h11", "id": 3}, "position_m": [0, -0.5, 1]},
+       "marker": {"family": "apriltag36h11", "id": 3, "side_m": 0.08}, "position_m": [0, -0.5, 1]},
       {"name": "lamp", "shape": "box", "size_m": [0.1, 0.2, 0.1], "material": "guide",
        "color": "#ff8000", "annotation": "1b4e28ba-2fa1-41d2-883f-0016d3cca427",
        "rotation_xyzw": [0, 0.70710678, 0, 0.70710678]}]})",
@@ -72,6 +72,7 @@ TEST_F(SceneFile, IsReadAndWrittenTheSame) {
   ASSERT_EQ(scene->models.size(), 1u);
   EXPECT_EQ(scene->objects[1].parent, SceneParent::kMarker);
   EXPECT_EQ(scene->objects[1].marker_id, 3u);
+  EXPECT_EQ(scene->objects[1].marker_side_m, 0.08);
   EXPECT_EQ(scene->objects[2].parent, SceneParent::kAnchor);
   EXPECT_EQ(scene->objects[2].color_rgba, 0xff8000ffu);
   const TriangleMesh drawer = MeshOf(scene->objects[1], scene->models[0].get());
@@ -98,6 +99,12 @@ TEST_F(SceneFile, EachProblemIsNamedWithItsPlace) {
   EXPECT_THAT(MessageOf(R"({"objects": [{"name": "a", "shape": "model",
                                          "model": "../../secret.glb"}]})"),
               HasSubstr("outside the scene's folder"));
+  EXPECT_THAT(MessageOf(R"({"objects": [{"name": "a", "shape": "box", "size_m": [1, 1, 1],
+                                         "marker": {"family": "apriltag36h11", "id": 3}}]})"),
+              HasSubstr("objects[0].marker.side_m: is missing"));
+  EXPECT_THAT(MessageOf(R"({"objects": [{"name": "a", "shape": "box", "size_m": [1, 1, 1],
+                "marker": {"family": "apriltag36h11", "id": 3, "side_m": 0}}]})"),
+              HasSubstr("objects[0].marker.side_m: 0; give"));
   EXPECT_THAT(MessageOf(R"({"objects": [{"name": "a", "shape": "model", "model": "none.glb"}]})"),
               HasSubstr("none.glb"));
 }

@@ -42,7 +42,7 @@ TEST(PlacementJudge, SeesCutsAndWhatLiesInside) {
 }
 
 TEST(Placements, RestWithinAMillimetreByAnIndependentJudge) {
-  int placed = 0;
+  int placed = 0, slid = 0;
   for (std::uint64_t index = 0; placed < 25; ++index) {
     ASSERT_LT(index, 200u);
     const PlacementOutcome one = RunPlacement(7, index);
@@ -51,10 +51,12 @@ TEST(Placements, RestWithinAMillimetreByAnIndependentJudge) {
       continue;
     }
     ++placed;
+    slid += one.slid_m > 0.01 ? 1 : 0;
     EXPECT_LT(std::abs(one.rest_gap_m), 1e-3) << index << " " << one.thing;
     EXPECT_LT(std::abs(one.push_gap_m), 1e-3) << index << " " << one.thing;
     EXPECT_TRUE(one.path_free) << index << " " << one.thing;
   }
+  EXPECT_GE(slid, 4);
 }
 
 }  // namespace

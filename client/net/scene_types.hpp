@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "shared/scene/scene_light.hpp"
+#include "shared/scene/scene_object.hpp"
+
+namespace saccade::net {
+
+struct ModelFacts {
+  std::string id, name;
+  std::uint32_t triangles = 0, bytes = 0;
+  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();
+};
+
+/// What changed in the scene.
+struct SceneChange {
+  std::uint64_t revision = 0;
+  bool full = false;  // forget what there was
+  std::vector<SceneObject> upserted;
+  std::vector<std::string> removed_ids;
+  std::vector<ModelFacts> added_models;
+  SceneLight light;
+};
+
+}  // namespace saccade::net
