@@ -11,6 +11,7 @@
 #include "client/cli/interrupt.hpp"
 #include "client/cli/session_file.hpp"
 #include "client/view/panels.hpp"
+#include "client/view/typesetter.hpp"
 
 namespace saccade::app {
 namespace {
@@ -202,37 +203,7 @@ bool App::RunInPane(tools::Action action, bool shift, Timestamp now_ns) {
   }
 }
 
-void App::NeedFonts() {
-  for (const Tab& each : tabs_) {
-    const session::State& told = each.desk->session();
-    for (const Annotation& mark : told.annotations.List()) {
-      window_->Need(mark.text);
-      window_->Need(mark.author);
-      if (!mark.check_items) continue;
-      for (const CheckItem& item : *mark.check_items) {
-        window_->Need(item.text);
-        window_->Need(item.done_by);
-      }
-    }
-    for (const net::ChatMessage& message : told.chat.messages()) {
-      window_->Need(message.display_name);
-      window_->Need(message.text);
-    }
-    for (const net::Participant& person : told.participants) window_->Need(person.display_name);
-    const view::DeskState& state = each.desk->state();
-    window_->Need(state.talk.text);
-    window_->Need(state.filter.text);
-    window_->Need(each.desk->title());
-    if (state.editor) window_->Need(state.editor->text);
-    if (!state.dialog) continue;
-    for (const auto* text : {&state.dialog->title, &state.dialog->lines, &state.dialog->file}) {
-      window_->Need(*text);
-    }
-  }
-}
-
 absl::Status App::Draw(Timestamp now_ns) {
-  NeedFonts();
   if (absl::Status begun = window_->Begin(); !begun.ok()) return begun;
   if (trace_) trace_->Drawing();
   if (std::exchange(leave_field_, false)) ImGui::SetWindowFocus(nullptr);
@@ -247,6 +218,7 @@ absl::Status App::Draw(Timestamp now_ns) {
   if (pointer_.over_edge()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
   const std::size_t drawn = shown_;
   window_->End();
+  if (view::Types().stale()) busy_frames_ = kSettle;  // words wait for it
   const Timestamp shown_ns = MonotonicNow();
   tabs_[drawn].desk->Shown(shown_ns);
   if (trace_) trace_->Shown(*tabs_[drawn].desk, *tabs_[drawn].view, layout_, drawn, shown_ns);

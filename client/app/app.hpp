@@ -40,8 +40,6 @@ class App {
   void HandleKey(const view::InputEvent& event, Timestamp now_ns);
   /// True if that action needs the pane that keys are about, and was done.
   bool RunInPane(tools::Action action, bool shift, Timestamp now_ns);
-  /// Fonts for what people have written.
-  void NeedFonts();
   absl::Status Draw(Timestamp now_ns);
   /// Where the wearer's camera appears in the map decides where the inset stands.
   void PlaceInset(Timestamp now_ns);

@@ -94,6 +94,7 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
                {"tool", tools::ControlOf(state.tool).label},
                {"selected", state.selection.last()},
                {"selection", state.selection.ids()},
+               {"hidden", state.hidden.size()},
                {"lasers", told.pointers.lasers()},
                {"editing", state.editor.has_value() || state.dialog.has_value()},
                {"said", told.chat.messages().size()},
@@ -131,6 +132,7 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
   for (const Annotation& annotation : told.annotations.List()) {
     marks.push_back({{"id", annotation.id},
                      {"text", annotation.text},
+                     {"points", annotation.ink_offset_m.size()},
                      {"words", tools::WordsOf(annotation, scale).text}});
   }
   line["marks"] = std::move(marks);

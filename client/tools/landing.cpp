@@ -74,7 +74,8 @@ std::optional<Landing> OnPlane(const View& view, const Eigen::Vector3d& directio
   // A slanted plane carries its error along the ray.
   const double slant = std::max(std::abs(direction.dot(plane->normal)), 0.1);
   const double sigma_m = std::hypot(plane->residual_m, Median(sigmas)) / slant;
-  return Landing{PointTarget{*point}, std::nullopt, *point, sigma_m, depth_m, How::kPlane};
+  return Landing{PointTarget{*point}, std::nullopt, *point, sigma_m, depth_m,
+                 How::kPlane,         plane->normal};
 }
 
 /// With a target still to be set.

@@ -24,6 +24,7 @@ struct Landing {
   std::optional<double> sigma_m;                             // nothing: depth not known
   double depth_m = 0;
   How how = How::kUnknownDepth;
+  std::optional<Eigen::Vector3d> normal_in_world{};  // unit, of the surface; nothing: not known
 };
 
 /// A click on the video: the pixel of the frame that is on the screen. Nothing outside the lens.

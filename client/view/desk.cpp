@@ -152,6 +152,8 @@ void Desk::Escape() {
   } else if (state_.ink.drawing()) {
     state_.ink.Cancel();
     EndSketch();
+  } else if (drawing_) {
+    DropDrawing();
   } else if (turning_) {
     DropHandle(false, "");
   } else if (state_.area) {
@@ -218,8 +220,7 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
       state_.filter.mine = !state_.filter.mine;
       return;
     case kHideMarks:
-      state_.hide_marks = !state_.hide_marks;
-      return;
+      return HideMarks();
     case kSnapshot:
       return Snapshot(now_ns);
     case kSelectAll:

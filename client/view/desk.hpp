@@ -15,6 +15,7 @@
 #include "client/session/pointing.hpp"
 #include "client/session/session.hpp"
 #include "client/talk/voice_room.hpp"
+#include "client/tools/drawn.hpp"
 #include "client/tools/orbit.hpp"
 #include "client/tools/view.hpp"
 #include "client/view/desk_state.hpp"
@@ -123,8 +124,10 @@ class Desk {
   void ConfirmReset(bool really, Timestamp now_ns);
   /// Which frame's picture was last pressed, and where; for tests.
   const std::optional<PixelTarget>& pressed() const { return pressed_pixel_; }
-  /// A drag is of a mark, a rectangle or the laser pointer: it does not turn the map.
-  bool dragging_mark() const { return moving_ || turning_ || state_.area || !laser_id_.empty(); }
+  /// A drag is of a mark, a rectangle, a box, ink or the laser pointer: it does not turn the map.
+  bool dragging_mark() const {
+    return moving_ || turning_ || state_.area || drawing_ || !laser_id_.empty();
+  }
   /// What was pressed goes on until it is let go.
   bool holding() const { return dragging_mark() || state_.ink.drawing(); }
   /// The one mark that has a handle now.
@@ -158,7 +161,10 @@ class Desk {
   void PutOthers(const std::vector<CopiedMark>& others, const Eigen::Vector3d& from,
                  const std::string& group, const Where& where);
   void MoveSelected(const std::string& grabbed, const tools::Landing& landing, const Where& where);
-  void PlaceDraft(AnnotationDraft draft, const tools::Landing& landing, const Where& where);
+  /// `answered` is called once the server has, whatever it said.
+  void PlaceDraft(
+      AnnotationDraft draft, const tools::Landing& landing, const Where& where,
+      std::function<void()> answered = [] {});
   bool GripHandle(const Eigen::Vector2d& pixel, const tools::View& view, double pick_px);
   void DragHandle(const Eigen::Vector2d& pixel, const tools::View& view);
   void DropHandle(bool keep, const Where& where);
@@ -220,6 +226,24 @@ class Desk {
   void PointAt(const AnnotationTarget& target, bool released);
   std::shared_ptr<session::Pointing> sketch_;  // the stroke under way, for the others
   std::vector<std::shared_ptr<session::Pointing>> sketches_;  // until their end was sent
+  /// A box or, in the map, a stroke: on the plane that was pressed.
+  struct Drawing {
+    Pane pane;
+    tools::Landing landing;
+    tools::Plane plane;
+    std::string pending_id;
+    Eigen::Vector2d last_px;
+    std::optional<tools::DrawnBox> box;   // once it was dragged
+    std::vector<Eigen::Vector3d> points;  // of a stroke; empty: it is a box
+  };
+  std::optional<Drawing> drawing_;
+  void BeginDrawing(Pane pane, const Eigen::Vector2d& pixel, const tools::View& view);
+  void Draw(Pane pane, const Eigen::Vector2d& pixel, const tools::View& view);
+  void FinishDrawing(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view,
+                     const Where& where, Timestamp now_ns);
+  void DropDrawing();
+  /// The selected ones are not drawn any more; with none selected all are again, or none is.
+  void HideMarks();
   void BeginSketch();
   void TellSketches(Timestamp now_ns);
   void EndSketch();

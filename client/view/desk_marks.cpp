@@ -81,6 +81,11 @@ void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* vie
     state_.ink.Begin(picture->facts->frame_id, pixel);
     BeginSketch();
   }
+  const bool draws = state_.tool == tools::Action::kBox ||
+                     (state_.tool == tools::Action::kInk && pane == Pane::kMap);
+  if (draws && !held.by_key && pressed_->landing && view != nullptr) {
+    BeginDrawing(pane, pixel, *view);
+  }
   if (state_.tool == tools::Action::kLaser && pressed_->landing && session().link.live()) {
     laser_id_ = net::RandomUuid();
     PointAt(pressed_->landing->target, false);
@@ -110,6 +115,7 @@ void Desk::Drag(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view
   }
   if (state_.area) state_.area->to = pixel;
   if (turning_ && view != nullptr) DragHandle(pixel, *view);
+  if (drawing_ && view != nullptr) Draw(pane, pixel, *view);
   if (laser_id_.empty() || MonotonicNow() - pointed_ns_ < kPointNs) return;
   if (const auto landing = LandingAt(pane, pixel, view)) PointAt(landing->target, false);
 }
@@ -146,6 +152,10 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
     state_.still.reset();
     return;
   }
+  if (drawing_ && (lift.moved || !drawing_->points.empty())) {
+    return FinishDrawing(pane, pixel, view, where, now_ns);
+  }
+  if (drawing_) DropDrawing();
   if (turning_) {
     if (lift.moved && view != nullptr) DragHandle(pixel, *view);
     return DropHandle(lift.moved, where);
@@ -184,7 +194,7 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
   }
   if (!pressed.landing) return refuse("Not placed: ");
   if (*shape == AnnotationShape::kInk) {
-    return state_.Refuse(where, "Not placed: ink is drawn in the video.", now_ns);
+    return state_.Refuse(where, "Nothing drawn: press, and move while you hold.", now_ns);
   }
   if (*shape == AnnotationShape::kNote) {
     state_.editor = TextEditor{pressed.landing, "", pane, lift.x, lift.y, "", false};

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,7 @@ class DeskState {
   bool confirming_reset = false;
   tools::MarkFilter filter;
   bool hide_marks = false;
+  std::set<std::string> hidden;  // marks that are not drawn until they are selected
   std::string my_name;
   std::uint32_t color_rgba = 0xffffffff;  // of new marks
   bool fast = false;                      // the head turns as fast as it can
@@ -118,8 +120,10 @@ class DeskState {
   /// True if it is drawn: a selected one always is.
   bool Draws(const Annotation& annotation) const {
     if (selection.Has(annotation.id)) return true;
-    return !hide_marks && tools::Passes(annotation, filter, my_name);
+    return !hide_marks && !hidden.contains(annotation.id) &&
+           tools::Passes(annotation, filter, my_name);
   }
+  bool hides() const { return hide_marks || !hidden.empty(); }
 
   void Refuse(const Where& where, const std::string& text, Timestamp now_ns) {
     refusals_[where] = {text, now_ns + 6'000'000'000};

@@ -63,13 +63,16 @@ void Desk::Show(const std::string& id) {
   orbit_.LookAt(mark->anchor.point_in_world, 0.4 * orbit_.distance_m());
 }
 
-void Desk::PlaceDraft(AnnotationDraft draft, const tools::Landing& landing, const Where& where) {
+void Desk::PlaceDraft(AnnotationDraft draft, const tools::Landing& landing, const Where& where,
+                      std::function<void()> answered) {
   session::Edits::Placement placement{std::move(draft), landing.later, landing.point_in_world, ""};
   placement.draft.target = landing.target;
   placement.draft.color_rgba = state_.color_rgba;
   edits_.Place(std::move(placement),
-               [this, tell = Tell(where, "Not placed: ")](const absl::StatusOr<std::string>& id) {
+               [this, answered = std::move(answered),
+                tell = Tell(where, "Not placed: ")](const absl::StatusOr<std::string>& id) {
                  if (id.ok()) state_.selection.Only(*id);
+                 answered();
                  tell(id);
                });
 }

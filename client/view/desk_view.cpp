@@ -9,6 +9,7 @@
 #include "client/tools/turn.hpp"
 #include "client/tools/words.hpp"
 #include "client/view/theme.hpp"
+#include "client/view/typesetter.hpp"
 
 namespace saccade::view {
 namespace {
@@ -78,9 +79,9 @@ void DeskView::Draw(Pane pane, const Rect& rect, const Canvas& canvas, ImDrawLis
   } else {
     DrawVideo(rect, canvas, list);
   }
-  const std::string note = Note(pane, now_ns);
-  if (note.empty()) return;
   const float wrap = std::max(rect.width - 48 * canvas.scale, 80.0f);
+  const std::string note = Types().Set(Note(pane, now_ns), wrap);
+  if (note.empty()) return;
   const ImVec2 size = ImGui::CalcTextSize(note.c_str(), nullptr, false, wrap);
   const ImVec2 at{rect.x + 0.5f * (rect.width - size.x), rect.y + 14 * canvas.scale};
   const float pad = 8 * canvas.scale;
@@ -301,7 +302,7 @@ void DeskView::DrawSight(const tools::View& view, Painter& painter) const {
   const EdgeArrow& arrow = marks.edge_arrows.front();
   const ImVec2 tip = painter.At(arrow.tip_px);
   const std::string words = tools::TargetLabel(*gaze);
-  const float width = ImGui::CalcTextSize(words.c_str()).x;
+  const float width = ImGui::CalcTextSize(Types().Set(words).c_str()).x;
   const float dx = static_cast<float>(arrow.direction.x()),
               dy = static_cast<float>(arrow.direction.y());
   const float away = 2.2f * ImGui::GetFontSize();

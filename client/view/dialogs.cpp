@@ -2,7 +2,6 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <utility>
@@ -33,8 +32,8 @@ void DrawEditor(const PanelContext& context, const Rect& within) {
   ImGui::SetNextItemWidth(-1);
   if (!editor.opened) ImGui::SetKeyboardFocusHere();
   editor.opened = true;
-  const bool entered =
-      ImGui::InputText("##text", &editor.text, ImGuiInputTextFlags_EnterReturnsTrue);
+  const bool entered = Field("##text", editor.text, "", ImGuiInputTextFlags_EnterReturnsTrue);
+  AsRead(editor.text);
   const bool fits = editor.text.size() <= tools::kMaxTextBytes;
   const std::size_t room =
       fits ? tools::kMaxTextBytes - editor.text.size() : editor.text.size() - tools::kMaxTextBytes;
@@ -80,13 +79,14 @@ void DrawDialog(const PanelContext& context, const Rect& within) {
   dialog.opened = true;
   bool keep = std::exchange(dialog.finish, false);
   if (list) {
-    ImGui::InputText("##title", &dialog.title);
+    Field("##title", dialog.title);
     ImGui::TextUnformatted("What is to be done, a line each");
-    keep = ImGui::InputTextMultiline("##lines", &dialog.lines, {-1, 7 * ImGui::GetFontSize()},
-                                     ImGuiInputTextFlags_EnterReturnsTrue) ||
+    keep = LinesField("##lines", dialog.lines, {-1, 7 * ImGui::GetFontSize()},
+                      ImGuiInputTextFlags_EnterReturnsTrue) ||
            keep;  // with Ctrl
+    AsRead(dialog.lines);
   } else {
-    keep = ImGui::InputText("##file", &dialog.file, ImGuiInputTextFlags_EnterReturnsTrue) || keep;
+    keep = Field("##file", dialog.file, "", ImGuiInputTextFlags_EnterReturnsTrue) || keep;
     if (absl::EndsWithIgnoreCase(dialog.file, ".pdf")) {
       ImGui::TextUnformatted("Page");
       ImGui::SetNextItemWidth(8 * ImGui::GetFontSize());
@@ -95,8 +95,9 @@ void DrawDialog(const PanelContext& context, const Rect& within) {
     }
     ImGui::TextUnformatted("Words under it");
     ImGui::SetNextItemWidth(-1);
-    keep = ImGui::InputText("##title", &dialog.title, ImGuiInputTextFlags_EnterReturnsTrue) || keep;
+    keep = Field("##title", dialog.title, "", ImGuiInputTextFlags_EnterReturnsTrue) || keep;
   }
+  AsRead(dialog.title);
   if (dialog.loading) Wrapped(Colours().dim, "Reading the file.");
   Wrapped(Colours().warn, dialog.problem);
   ImGui::PushStyleColor(ImGuiCol_Button, Colours().line);

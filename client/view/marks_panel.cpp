@@ -2,13 +2,13 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <array>
 
 #include "client/tools/words.hpp"
 #include "client/view/panels.hpp"
+#include "client/view/typesetter.hpp"
 #include "shared/marks/shape_lines.hpp"
 
 namespace saccade::view {
@@ -45,14 +45,14 @@ void DrawBar(const PanelContext& context) {
   for (const tools::Control& control : tools::Controls()) {
     if (control.group != tools::Group::kMarks) continue;
     const bool on = (control.action == tools::Action::kOnlyMine && desk.state().filter.mine) ||
-                    (control.action == tools::Action::kHideMarks && desk.state().hide_marks);
+                    (control.action == tools::Action::kHideMarks && desk.state().hides());
     if (ControlButton(control, on, width, context.fonts)) desk.Run(control.action, context.now_ns);
     if (control.action != tools::Action::kSnapshot) ImGui::SameLine(0, 4 * context.scale);
   }
   Wrapped(Colours().warn, desk.state().Refusal("Snapshot"));
   ImGui::SetNextItemWidth(-1);
   if (std::exchange(desk.state().find, false)) ImGui::SetKeyboardFocusHere();
-  ImGui::InputTextWithHint("##find", "Find marks (/)", &desk.state().filter.text);
+  Field("##find", desk.state().filter.text, "Find marks (/)");
 }
 
 /// The lines of a check list, to be ticked off; who did stands beside.
@@ -118,8 +118,11 @@ void DrawRow(const PanelContext& context, const Annotation& annotation, const to
   title = title.substr(0, title.find('\n'));
   if (annotation.text.empty() && title.empty()) title = tools::ShapeWord(annotation.shape);
   if (annotation.locked) title += " (locked)";
-  const std::string by =
-      annotation.anchor.state == AnchorState::kProvisional ? "provisional" : annotation.author;
+  if (desk.state().hidden.contains(id)) title += " (hidden)";
+  title = Types().Set(title);
+  const std::string by = annotation.anchor.state == AnchorState::kProvisional
+                             ? "provisional"
+                             : Types().Set(annotation.author);
   list->PushClipRect(at, {at.x + width - buttons, at.y + size.y}, true);
   list->AddText({text_x, at.y + pad}, Colours().text, title.c_str());
   const float title_width = ImGui::CalcTextSize(title.c_str()).x;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "client/view/theme.hpp"
+#include "client/view/typesetter.hpp"
 
 namespace saccade::view {
 namespace {
@@ -143,6 +144,7 @@ void Painter::Tag(const Label& label, ImU32 color, bool whole, std::vector<Rect>
   }
   const float inset = 6 * unit_;
   const float wrap = whole ? std::min(300 * unit_, pane_.width - 4 * inset) : 0.0f;
+  text = Types().Set(text, wrap);
   ImFont* font = ImGui::GetFont();
   const float size = ImGui::GetFontSize();
   const ImVec2 extent = font->CalcTextSizeA(size, 1e6f, wrap, text.c_str());
@@ -226,7 +228,7 @@ void Painter::Target(const Eigen::Vector2d& pixel, bool held, const std::string&
                      {at.x + d.x * r * 1.55f, at.y + d.y * r * 1.55f}, color, width * unit_);
     }
   }
-  const float width = ImGui::CalcTextSize(words.c_str()).x;
+  const float width = ImGui::CalcTextSize(Types().Set(words).c_str()).x;
   const bool left = at.x + r * 1.7f + width > pane_.right();
   Words({left ? at.x - r * 1.7f - width : at.x + r * 1.7f, at.y + r * 1.3f}, words, kTarget);
 }
@@ -273,8 +275,9 @@ void Painter::Ring(const Eigen::Vector2d& pixel, std::optional<double> radius_px
   Words({at.x + r + 7 * unit_, at.y}, words, kWhite);
 }
 
-void Painter::Words(ImVec2 at, const std::string& words, ImU32 color) {
-  if (words.empty()) return;
+void Painter::Words(ImVec2 at, const std::string& written, ImU32 color) {
+  if (written.empty()) return;
+  const std::string words = Types().Set(written);
   const float y = at.y - 0.5f * ImGui::GetFontSize();
   for (const float dx : {-1.3f, 0.0f, 1.3f}) {
     for (const float dy : {-1.3f, 0.0f, 1.3f}) {

@@ -3,17 +3,19 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <imgui.h>
+#include <imgui_stdlib.h>
 
 #include <algorithm>
 
 #include "client/tools/words.hpp"
+#include "client/view/typesetter.hpp"
 
 namespace saccade::view {
 namespace {
 
 void Colored(ImU32 color, const std::string& text) {
   ImGui::PushStyleColor(ImGuiCol_Text, color);
-  ImGui::TextUnformatted(text.c_str());
+  ImGui::TextUnformatted(Types().Set(text).c_str());
   ImGui::PopStyleColor();
 }
 
@@ -21,14 +23,16 @@ void Colored(ImU32 color, const std::string& text) {
 void Fitted(ImU32 color, const std::string& text, float width) {
   std::string shown = text;
   if (width < 2 * ImGui::GetFontSize()) return;
-  while (!shown.empty() && ImGui::CalcTextSize((shown + "…").c_str()).x > width) {
+  const auto extent = [](const std::string& words) {
+    return ImGui::CalcTextSize(Types().Set(words).c_str()).x;
+  };
+  while (!shown.empty() && extent(shown + "…") > width) {
     do {
       shown.pop_back();
     } while (!shown.empty() && (static_cast<unsigned char>(shown.back()) & 0xc0) == 0xc0);
   }
-  Colored(color,
-          shown == text || ImGui::CalcTextSize(text.c_str()).x <= width ? text : shown + "…");
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", text.c_str());
+  Colored(color, shown == text || extent(text) <= width ? text : shown + "…");
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", Types().Set(text).c_str());
 }
 
 }  // namespace
@@ -53,9 +57,28 @@ void Wrapped(ImU32 color, const std::string& text) {
   if (text.empty()) return;
   ImGui::PushStyleColor(ImGuiCol_Text, color);
   ImGui::PushTextWrapPos();
-  ImGui::TextUnformatted(text.c_str());
+  ImGui::TextUnformatted(Types().Set(text, ImGui::GetContentRegionAvail().x).c_str());
   ImGui::PopTextWrapPos();
   ImGui::PopStyleColor();
+}
+
+bool Field(const char* label, std::string& text, const char* hint, ImGuiInputTextFlags flags) {
+  std::string field = Types().ToField(text);
+  const bool entered = ImGui::InputTextWithHint(label, hint, &field, flags);
+  text = Types().FromField(field);
+  return entered;
+}
+
+bool LinesField(const char* label, std::string& text, const ImVec2& size,
+                ImGuiInputTextFlags flags) {
+  std::string field = Types().ToField(text);
+  const bool entered = ImGui::InputTextMultiline(label, &field, size, flags);
+  text = Types().FromField(field);
+  return entered;
+}
+
+void AsRead(const std::string& text) {
+  if (!Typesetter::IsSimple(text)) Wrapped(Colours().dim, absl::StrCat("Reads:\n", text));
 }
 
 void NoteAbove(Desk& desk) {
@@ -112,7 +135,7 @@ bool DrawHeader(const PanelContext& context, const Rect& rect) {
     for (const net::Participant& one : state.participants) {
       absl::StrAppend(&names, names.empty() ? "" : ", ", one.display_name);
     }
-    ImGui::SetTooltip("%s", names.c_str());
+    ImGui::SetTooltip("%s", Types().Set(names).c_str());
   }
   ImGui::SetCursorPos({right, 0.5f * (rect.height - ImGui::GetFrameHeight())});
   const bool help = ImGui::Button("?", {button, 0});
@@ -126,8 +149,8 @@ std::size_t DrawTabs(const std::vector<Desk*>& desks, std::size_t shown, const R
   ImGui::SetCursorPosY(0.5f * (rect.height - ImGui::GetFrameHeight()));
   for (std::size_t i = 0; i < desks.size(); ++i) {
     const tools::StatusWords words = tools::StatusOf(desks[i]->session(), now_ns);
-    const std::string text =
-        absl::StrCat(words.mark, " ", desks[i]->title(), ": ", words.text, "###tab", i);
+    const std::string text = absl::StrCat(words.mark, " ", Types().Set(desks[i]->title()), ": ",
+                                          words.text, "###tab", i);
     const bool on = i == shown;
     ImGui::PushStyleColor(ImGuiCol_Button, on ? Colours().accent : Colours().raised);
     ImGui::PushStyleColor(ImGuiCol_ButtonHovered, on ? Colours().accent : Colours().line);

@@ -45,6 +45,14 @@ void DrawTalk(const PanelContext& context, const Rect& rect);
 /// What the keys do and what the colours mean, over everything. `open` false: does nothing.
 void DrawHelp(const PanelContext& context, bool& open);
 
+/// ImGui's fields, of text as it is written (UTF-8).
+bool Field(const char* label, std::string& text, const char* hint = "",
+           ImGuiInputTextFlags flags = 0);
+bool LinesField(const char* label, std::string& text, const ImVec2& size,
+                ImGuiInputTextFlags flags);
+/// How it will be read, where a field cannot show that; else nothing.
+void AsRead(const std::string& text);
+
 /// Wrapped at the panel's edge; nothing of empty words.
 void Wrapped(ImU32 color, const std::string& text);
 /// A button with its key; true when pressed. `on`: it is the current one.

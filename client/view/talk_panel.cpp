@@ -1,13 +1,13 @@
 // What people say: lines that may carry a mark ("look here").
 #include <absl/strings/str_cat.h>
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
 #include <utility>
 
 #include "client/tools/marks.hpp"
 #include "client/tools/words.hpp"
 #include "client/view/panels.hpp"
+#include "client/view/typesetter.hpp"
 
 namespace saccade::view {
 namespace {
@@ -17,7 +17,7 @@ void DrawMessage(const PanelContext& context, const net::ChatMessage& message) {
   const bool mine = message.participant_id == desk.session().joined.participant_id;
   ImGui::PushID(static_cast<int>(message.number));
   ImGui::PushStyleColor(ImGuiCol_Text, Colours().dim);
-  ImGui::TextUnformatted(absl::StrCat(mine ? "you" : message.display_name, "  ",
+  ImGui::TextUnformatted(absl::StrCat(mine ? "you" : Types().Set(message.display_name), "  ",
                                       tools::ClockWords(message.sent_unix_ns))
                              .c_str());
   ImGui::PopStyleColor();
@@ -26,7 +26,10 @@ void DrawMessage(const PanelContext& context, const net::ChatMessage& message) {
     const Annotation* mark = desk.session().annotations.Find(message.annotation_id);
     if (mark == nullptr) {
       Wrapped(Colours().dim, "the mark is gone");
-    } else if (ImGui::Button(absl::StrCat("look here: ", tools::TitleOf(*mark)).c_str())) {
+    } else if (ImGui::Button(
+                   absl::StrCat(Types().Set(absl::StrCat("look here: ", tools::TitleOf(*mark))),
+                                "###look")
+                       .c_str())) {
       desk.Show(mark->id);
     }
   }
@@ -40,7 +43,7 @@ void DrawField(const PanelContext& context) {
   if (mark == nullptr) talk.carries = false;
   if (mark != nullptr) {
     const std::string chip =
-        absl::StrCat(talk.carries ? "✓ " : "+ ", tools::TitleOf(*mark), "##carries");
+        absl::StrCat(talk.carries ? "✓ " : "+ ", Types().Set(tools::TitleOf(*mark)), "###carries");
     if (ImGui::Button(chip.c_str())) talk.carries = !talk.carries;
     if (ImGui::IsItemHovered()) {
       ImGui::SetTooltip("Look here: the selected mark goes with the message");
@@ -50,8 +53,7 @@ void DrawField(const PanelContext& context) {
   ImGui::SetNextItemWidth(-send);
   if (std::exchange(talk.wanted, false)) ImGui::SetKeyboardFocusHere();
   ImGui::PushID(talk.field);
-  bool entered = ImGui::InputTextWithHint("##say", "Message (9)", &talk.text,
-                                          ImGuiInputTextFlags_EnterReturnsTrue);
+  bool entered = Field("##say", talk.text, "Message (9)", ImGuiInputTextFlags_EnterReturnsTrue);
   talk.writing = ImGui::IsItemActive();
   ImGui::PopID();
   entered = std::exchange(talk.finish, false) || entered;
@@ -60,6 +62,7 @@ void DrawField(const PanelContext& context) {
     desk.Say();
     talk.wanted = entered;  // for the next one
   }
+  AsRead(talk.text);
   Wrapped(Colours().warn, talk.problem);
 }
 
@@ -82,7 +85,8 @@ void DrawTalk(const PanelContext& context, const Rect& rect) {
   }
   ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, ImVec2(0, 0.5f));
   ImGui::PushStyleColor(ImGuiCol_Text, unread > 0 ? Colours().accent : Colours().text);
-  if (ImGui::Button(absl::StrCat(head, "###talk").c_str(), {-1, 0})) talk.open = !talk.open;
+  if (ImGui::Button(absl::StrCat(Types().Set(head), "###talk").c_str(), {-1, 0}))
+    talk.open = !talk.open;
   ImGui::PopStyleColor();
   ImGui::PopStyleVar();
   if (!talk.open) talk.writing = false;
@@ -91,7 +95,8 @@ void DrawTalk(const PanelContext& context, const Rect& rect) {
     DrawVoice(context);
     const float field =
         (desk.state().selection.empty() ? 1.0f : 2.0f) * ImGui::GetFrameHeightWithSpacing() +
-        (talk.problem.empty() ? 0.0f : 2 * ImGui::GetTextLineHeightWithSpacing());
+        (talk.problem.empty() ? 0.0f : 2 * ImGui::GetTextLineHeightWithSpacing()) +
+        (Typesetter::IsSimple(talk.text) ? 0.0f : 3 * ImGui::GetTextLineHeightWithSpacing());
     ImGui::BeginChild("messages", {0, -field});
     const bool at_end = ImGui::GetScrollY() >= ImGui::GetScrollMaxY() - 40 * context.scale;
     for (const net::ChatMessage& message : state.chat.messages()) DrawMessage(context, message);

@@ -1,19 +1,18 @@
 #include "client/view/theme.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
-#include <iterator>
-#include <map>
 #include <string>
-#include <vector>
 
-#include "client/view/system_fonts.hpp"
+#include "client/view/typesetter.hpp"
 
 namespace saccade::view {
 namespace {
 
 constexpr const char* kFolder = "/usr/share/fonts/truetype/dejavu/";
 constexpr float kTextPx = 14;
+constexpr float kLineOfEm = 1.164f;  // DejaVu's ascent and descent
 // Latin, Greek, Cyrillic; punctuation; arrows, signs and geometric shapes.
 constexpr ImWchar kRanges[] = {0x20,   0x24f,  0x370,  0x52f,  0x2010, 0x205e, 0x2190, 0x21ff,
                                0x2200, 0x22ff, 0x25a0, 0x2612, 0x2713, 0x2718, 0};
@@ -25,15 +24,6 @@ ImFont* Load(const char* name, float size_px) {
   config.OversampleH = 2;
   config.PixelSnapH = true;
   return ImGui::GetIO().Fonts->AddFontFromFileTTF(file.c_str(), size_px, &config, kRanges);
-}
-
-/// Into the font that was loaded last. Ranges have to live until the texture is made.
-void Merge(const FontFile& file, const std::vector<ImWchar>& ranges, float size_px) {
-  ImFontConfig config;
-  config.MergeMode = true;
-  config.PixelSnapH = true;
-  config.FontNo = file.index;
-  ImGui::GetIO().Fonts->AddFontFromFileTTF(file.path.c_str(), size_px, &config, ranges.data());
 }
 
 const Palette* current = &kDark;  // main thread
@@ -65,7 +55,7 @@ bool IsAlwaysThere(unsigned character) {
   return false;
 }
 
-absl::Status ApplyTheme(float scale, bool light, const std::set<ImWchar>& needed, Fonts& fonts) {
+absl::Status ApplyTheme(float scale, bool light, Fonts& fonts) {
   current = light ? &kLight : &kDark;
   ImGuiStyle style;
   style.WindowRounding = style.ChildRounding = 0;
@@ -99,26 +89,20 @@ absl::Status ApplyTheme(float scale, bool light, const std::set<ImWchar>& needed
   Colour(ImGuiCol_TextSelectedBg,
          light ? IM_COL32(0x5a, 0x3f, 0xb3, 70) : IM_COL32(0xc4, 0xb0, 0xff, 90));
   const float size_px = kTextPx * scale;
-  std::map<FontFile, std::vector<ImWchar>> ranges;  // by the font that has them
-  for (const ImWchar character : needed) {
-    if (const auto file = FontWith(character)) {
-      ranges[*file].insert(ranges[*file].end(), {character, character});
-    }
-  }
-  for (auto& [file, characters] : ranges) characters.push_back(0);
   ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
-  for (const bool merged : {true, false}) {
-    atlas.Clear();
-    fonts.bold = Load("DejaVuSans-Bold.ttf", size_px);
-    fonts.text = Load("DejaVuSans.ttf", size_px);
-    if (fonts.text == nullptr || fonts.bold == nullptr) break;
-    if (merged) {
-      for (const auto& [file, characters] : ranges) Merge(file, characters, size_px);
-    }
-    ImGui::GetIO().FontDefault = fonts.text;
-    if (atlas.Build() || !merged) return absl::OkStatus();
+  atlas.Clear();
+  fonts.bold = Load("DejaVuSans-Bold.ttf", size_px);
+  fonts.text = Load("DejaVuSans.ttf", size_px);
+  if (fonts.text == nullptr || fonts.bold == nullptr) {
+    return absl::NotFoundError(std::string("no fonts in ") + kFolder +
+                               ": install fonts-dejavu-core");
   }
-  return absl::NotFoundError(std::string("no fonts in ") + kFolder + ": install fonts-dejavu-core");
+  ImGui::GetIO().FontDefault = fonts.text;
+  Types().SetSize(static_cast<int>(std::lround(size_px / kLineOfEm)));
+  Types().Reserve(atlas);
+  atlas.Build();
+  Types().Draw(atlas, {fonts.text, fonts.bold});
+  return absl::OkStatus();
 }
 
 }  // namespace saccade::view

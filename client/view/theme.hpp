@@ -4,7 +4,6 @@
 #include <imgui.h>
 
 #include <cstdint>
-#include <set>
 
 #include "shared/scene/map_snapshot.hpp"
 
@@ -55,12 +54,9 @@ struct Fonts {
 /// Whether every font here has that character.
 bool IsAlwaysThere(unsigned character);
 
-/// Sets ImGui's style and makes its fonts at this scale; may be called again when it changes. The
-/// font texture has to be made anew then. `needed`: characters beyond what is always there, taken
-/// from whichever of the system's outline fonts has them; what none has is drawn as a question
-/// mark. ImGui sets each character for itself, left to right: no joining, no right to left, and
-/// none beyond U+FFFF, where most emoji are.
+/// Sets ImGui's style and makes its fonts at this scale, with the glyphs that Types() has; may be
+/// called again when either changes. The font texture has to be made anew then.
 ///   NotFound  no font of DejaVu is installed, with the package's name
-absl::Status ApplyTheme(float scale, bool light, const std::set<ImWchar>& needed, Fonts& fonts);
+absl::Status ApplyTheme(float scale, bool light, Fonts& fonts);
 
 }  // namespace saccade::view

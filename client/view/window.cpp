@@ -8,16 +8,16 @@
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
-#include <imgui_internal.h>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "client/view/typesetter.hpp"
+
 namespace saccade::view {
 namespace {
 
-constexpr std::size_t kMostNeeded = 3000;  // characters
 constexpr int kLeastWidth = 640, kLeastHeight = 400;
 std::string last_error;  // GLFW's own words; main thread
 
@@ -67,6 +67,10 @@ absl::Status Window::Start() {
   io.IniFilename = nullptr;  // where things stand is ours to keep
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   ImGui_ImplGlfw_InitForOpenGL(window_, /*install_callbacks=*/true);  // and calls ours
+  // Instead of its own, which knows nothing beyond U+FFFF.
+  glfwSetCharCallback(window_,
+                      [](GLFWwindow* w, unsigned codepoint) { Self(w)->OnCharacter(codepoint); });
+  ShareClipboard();
   ImGui_ImplOpenGL3_Init("#version 330 core");
   return absl::OkStatus();
 }
@@ -103,8 +107,6 @@ void Window::Listen() {
   glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
     Self(w)->OnKey(key, scancode, action, mods);
   });
-  glfwSetCharCallback(window_,
-                      [](GLFWwindow* w, unsigned codepoint) { Self(w)->OnCharacter(codepoint); });
   glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** files) {
     if (count > 0) Self(w)->Add({.kind = InputEvent::Kind::kDrop, .file = files[0]});
   });
@@ -158,6 +160,7 @@ void Window::OnKey(int key, int scancode, int action, int mods) {
 
 void Window::OnCharacter(unsigned codepoint) {
   refresh_ = true;
+  ImGui::GetIO().AddInputCharacter(Types().ToField(codepoint));
   if (codepoint >= 0x80) return;
   const char c = absl::ascii_tolower(static_cast<unsigned char>(codepoint));
   InputEvent event;
@@ -177,18 +180,19 @@ void Window::Wait(double timeout_s) {
   }
 }
 
-void Window::Need(const std::string& text) {
-  for (const char* at = text.c_str(); *at != 0;) {
-    if (static_cast<unsigned char>(*at) < 0x80) {
-      ++at;
-      continue;
-    }
-    unsigned character = 0;
-    at += std::max(ImTextCharFromUtf8(&character, at, nullptr), 1);
-    if (character > IM_UNICODE_CODEPOINT_MAX || IsAlwaysThere(character)) continue;
-    if (needed_.size() >= kMostNeeded) return;  // the texture of a font has its bounds
-    if (needed_.insert(static_cast<ImWchar>(character)).second) fonts_stale_ = true;
-  }
+/// What lies in the clipboard is as it is written, what is in a field as Types() has it there.
+void Window::ShareClipboard() {
+  ImGuiIO& io = ImGui::GetIO();
+  io.ClipboardUserData = this;
+  io.GetClipboardTextFn = [](void* self) -> const char* {
+    auto& window = *static_cast<Window*>(self);
+    const char* const text = glfwGetClipboardString(window.window_);
+    window.pasted_ = Types().ToField(text == nullptr ? "" : text);
+    return window.pasted_.c_str();
+  };
+  io.SetClipboardTextFn = [](void* self, const char* field) {
+    glfwSetClipboardString(static_cast<Window*>(self)->window_, Types().FromField(field).c_str());
+  };
 }
 
 void Window::Wake() { glfwPostEmptyEvent(); }
@@ -200,13 +204,12 @@ void Window::Close() { glfwSetWindowShouldClose(window_, GLFW_TRUE); }
 
 absl::Status Window::Begin() {
   const float now = scale();
-  if (std::abs(now - fonts_scale_) > 0.01f || light_ != light_shown_ || fonts_stale_) {
+  if (std::abs(now - fonts_scale_) > 0.01f || light_ != light_shown_ || Types().stale()) {
     if (fonts_scale_ > 0) ImGui_ImplOpenGL3_DestroyFontsTexture();
-    if (absl::Status themed = ApplyTheme(now, light_, needed_, fonts_); !themed.ok()) return themed;
+    if (absl::Status themed = ApplyTheme(now, light_, fonts_); !themed.ok()) return themed;
     if (fonts_scale_ > 0) ImGui_ImplOpenGL3_CreateFontsTexture();
     fonts_scale_ = now;
     light_shown_ = light_;
-    fonts_stale_ = false;
   }
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();

@@ -3,7 +3,6 @@
 #include <absl/status/statusor.h>
 
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -52,9 +51,6 @@ class Window {
   /// Ends a Wait(), from any thread.
   static void Wake();
   void SetLight(bool light) { light_ = light; }
-  /// `text` (UTF-8) is to be shown: characters that no font was loaded for are looked for in the
-  /// system's, before the next picture.
-  void Need(const std::string& text);
   bool light() const { return light_; }
   /// What happened since the last call.
   std::vector<InputEvent> TakeInput();
@@ -83,13 +79,13 @@ class Window {
   void Add(InputEvent event);
   void OnKey(int key, int scancode, int action, int mods);
   void OnCharacter(unsigned codepoint);
+  void ShareClipboard();
 
   GLFWwindow* window_;
   GlFunctions gl_;
   Fonts fonts_;
   float fonts_scale_ = 0;
-  std::set<ImWchar> needed_;  // beside what is always there
-  bool fonts_stale_ = false;
+  std::string pasted_;  // what ImGui was last given from the clipboard
   bool light_ = false, light_shown_ = false;
   bool imgui_ = false, refresh_ = true, repeating_ = false;
   std::vector<InputEvent> input_;

@@ -9,8 +9,8 @@
 #include <string>
 #include <string_view>
 
-#include "server/overlay/font_store.hpp"
-#include "server/overlay/text_layout.hpp"
+#include "shared/text/font_store.hpp"
+#include "shared/text/text_layout.hpp"
 
 namespace saccade {
 

@@ -104,10 +104,9 @@ export class Desktop {
   }
 
   async settledGrab() {
-    for (let i = 0; i < 300; ++i) {
+    for (const end = Date.now() + 30_000; Date.now() < end; await sleep(3)) {
       const got = this.grab();
       if (got) return got;
-      await sleep(3);
     }
     throw new Error('the window never stood still long enough to be read');
   }

@@ -13,17 +13,12 @@ export async function runMarks(context, finding) {
 }
 
 /** An arrow, by its keys and by its handle. */
-async function turn(context, { findObject, marked, idsOf }) {
+async function turn(context, { findObject, place }) {
   const { desktop, screen, check, annotations } = context;
-  screen.press('a');
-  await desktop.until('the arrow is in hand', ({ tool }) => tool === 'Arrow');
-  const before = idsOf(desktop.look());
-  screen.click(await findObject(context, 0));
-  const placed = await desktop.until(
-    'the arrow',
-    (now) => marked(before)(now) || now.refused.video !== '',
+  const arrow = await place(context, 'a', 'Arrow', async () =>
+    screen.click(await findObject(context, 0)),
   );
-  const { id } = placed.marks.find((mark) => !before.has(mark.id)) ?? {};
+  const id = arrow?.id;
   screen.press('v');
   await desktop.until('it is selected', ({ selected }) => selected === id);
   const turned = async (was) => {
@@ -42,17 +37,27 @@ async function turn(context, { findObject, marked, idsOf }) {
     Math.abs(angle - 45) < 0.5,
     `${angle?.toFixed(2)} degrees`,
   );
+  await still(context, true); // what is gripped stands where it was seen
   const { handle } = await desktop.until('the handle', (shown) => Boolean(shown.handle));
   screen.move(handle);
   screen.input('mousedown', 1);
   for (let i = 1; i <= 6; ++i) screen.move([handle[0] + 5 * i, handle[1] + 5 * i]);
   screen.input('mouseup', 1);
   const byHand = await turned(byKeys);
+  await still(context, false);
   check('and its handle turns it too', Boolean(byHand), JSON.stringify(byHand));
 }
 
+/** Holds the picture, or lets it go on. */
+async function still({ desktop, screen }, wanted) {
+  if (Boolean(desktop.look().video?.frozen) === wanted) return;
+  screen.press('p');
+  await desktop.until('held, or not', ({ video }) => Boolean(video?.frozen) === wanted);
+}
+
 /** Every mark in the picture, by a rectangle round it. */
-async function rectangle({ desktop, screen, check, shot }) {
+async function rectangle(context) {
+  const { desktop, screen, check, shot } = context;
   screen.press('Escape', '2');
   await desktop.until('the rectangle is in hand', ({ tool }) => tool === 'Select several');
   const { left, top, width, height, scale } = desktop.look().video;

@@ -22,8 +22,8 @@ constexpr auto kServerOrder = std::to_array<string_view>(
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "talk", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder =
-    std::to_array<string_view>({"version", "io", "geometry", "time", "audio", "camera", "scene",
-                                "models", "marks", "wire", "render"});
+    std::to_array<string_view>({"version", "io", "text", "geometry", "time", "audio", "camera",
+                                "scene", "models", "marks", "wire", "render"});
 
 // Folders that see less than what is above them: only snapshots, packets and commands.
 struct Restriction {
@@ -63,10 +63,10 @@ const std::vector<Home>& Homes() {
       {"GLFW/", {"client/view"}},
       {"imgui", {"client/view", "client/app"}},
       {"backends/imgui", {"client/view"}},
-      {"hb.h", {"server/overlay"}},
-      {"ft2build.h", {"server/overlay"}},
-      {"fribidi.h", {"server/overlay"}},
-      {"fontconfig/", {"server/overlay", "client/view"}},
+      {"hb.h", {"shared/text"}},
+      {"ft2build.h", {"shared/text"}},
+      {"fribidi.h", {"shared/text"}},
+      {"fontconfig/", {"shared/text"}},
       {"libavformat/", {"server/capture"}},
       {"libavcodec/", {"server/capture"}},
       {"seccomp.h", {"server/capture"}},

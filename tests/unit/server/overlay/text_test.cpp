@@ -5,10 +5,10 @@
 #include <ctime>
 #include <random>
 
-#include "server/overlay/characters.hpp"
-#include "server/overlay/font_catalogue.hpp"
-#include "server/overlay/text_layout.hpp"
 #include "server/overlay/text_painter.hpp"
+#include "shared/text/characters.hpp"
+#include "shared/text/font_catalogue.hpp"
+#include "shared/text/text_layout.hpp"
 
 namespace saccade::text_test {
 namespace {

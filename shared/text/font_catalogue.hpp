@@ -18,15 +18,21 @@ struct FontFile {
   std::shared_ptr<void> coverage;  // FcCharSet
 };
 
-/// The fonts of this system, best first: bold sans serif that is easy to read from afar, then
-/// whatever else is installed. Immutable; any thread.
+/// Of letters: bold to be read from afar, over a picture; regular in a window.
+enum class FontWeight { kBold, kRegular };
+
+/// The fonts of this system, best first: sans serif of that weight, then whatever else is
+/// installed. Immutable; any thread.
 class FontCatalogue {
  public:
   /// What fontconfig knows, read once. Says on stderr, once, which named script has no font and
   /// which package would bring it.
-  static const FontCatalogue& System();
+  static const FontCatalogue& System(FontWeight weight = FontWeight::kBold);
 
-  explicit FontCatalogue(std::vector<FontFile> fonts) : fonts_(std::move(fonts)) {}
+  explicit FontCatalogue(std::vector<FontFile> fonts, FontWeight weight = FontWeight::kBold)
+      : fonts_(std::move(fonts)), weight_(weight) {}
+
+  FontWeight weight() const { return weight_; }
 
   const std::vector<FontFile>& fonts() const { return fonts_; }
 
@@ -41,6 +47,7 @@ class FontCatalogue {
   std::optional<std::size_t> FirstWith(std::u32string_view cluster, bool color) const;
 
   std::vector<FontFile> fonts_;
+  FontWeight weight_;
 };
 
 }  // namespace saccade

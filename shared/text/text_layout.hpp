@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "server/overlay/font_store.hpp"
+#include "shared/text/font_store.hpp"
 
 namespace saccade {
 

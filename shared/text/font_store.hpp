@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "server/overlay/font_catalogue.hpp"
+#include "shared/text/font_catalogue.hpp"
 
 // FreeType's own names, so that only font_store.cpp sees its macros.
 struct FT_LibraryRec_;

@@ -1,11 +1,11 @@
-#include "server/overlay/text_layout.hpp"
+#include "shared/text/text_layout.hpp"
 
 #include <fribidi.h>
 
 #include <algorithm>
 #include <memory>
 
-#include "server/overlay/characters.hpp"
+#include "shared/text/characters.hpp"
 
 namespace saccade {
 namespace {

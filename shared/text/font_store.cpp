@@ -1,4 +1,4 @@
-#include "server/overlay/font_store.hpp"
+#include "shared/text/font_store.hpp"
 
 #include <ft2build.h>
 
@@ -107,7 +107,9 @@ GlyphPicture FontStore::Draw(std::size_t font, std::uint32_t glyph, int size_px,
   if (FT_Load_Glyph(face->face, glyph, flags) != 0) return {};
   const FT_GlyphSlot slot = face->face->glyph;
   if (slot->format == FT_GLYPH_FORMAT_OUTLINE) {
-    if (!file.bold) FT_Outline_Embolden(&slot->outline, size_px * kUnit / kEmboldenShare);
+    if (!file.bold && catalogue_.weight() == FontWeight::kBold) {
+      FT_Outline_Embolden(&slot->outline, size_px * kUnit / kEmboldenShare);
+    }
     FT_Outline_Translate(&slot->outline, std::lround(shift_px * kUnit), 0);
   }
   if (FT_Render_Glyph(slot, FT_RENDER_MODE_NORMAL) != 0) return {};

@@ -1,4 +1,4 @@
-#include "server/overlay/characters.hpp"
+#include "shared/text/characters.hpp"
 
 #include <hb.h>
 

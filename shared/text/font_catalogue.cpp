@@ -1,4 +1,4 @@
-#include "server/overlay/font_catalogue.hpp"
+#include "shared/text/font_catalogue.hpp"
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
@@ -8,8 +8,8 @@
 #include <array>
 #include <tuple>
 
-#include "server/overlay/characters.hpp"
 #include "shared/io/log.hpp"
+#include "shared/text/characters.hpp"
 
 namespace saccade {
 namespace {
@@ -49,7 +49,7 @@ struct Candidate {
   std::tuple<std::size_t, bool, bool, bool, bool, std::string, int> order;
 };
 
-std::optional<Candidate> ReadPattern(FcPattern* pattern) {
+std::optional<Candidate> ReadPattern(FcPattern* pattern, FontWeight weight) {
   FontFile font;
   font.path = String(pattern, FC_FILE);
   font.index = Int(pattern, FC_INDEX, 0);
@@ -68,11 +68,12 @@ std::optional<Candidate> ReadPattern(FcPattern* pattern) {
   const bool slanted = Int(pattern, FC_SLANT, FC_SLANT_ROMAN) != FC_SLANT_ROMAN;
   const bool narrow = Int(pattern, FC_WIDTH, FC_WIDTH_NORMAL) != FC_WIDTH_NORMAL;
   const bool serif = !absl::StrContains(family, "Sans") && rank == kPreferred.size();
-  auto order = std::tuple(rank, slanted, serif, narrow, !font.bold, font.path, font.index);
+  const bool other_weight = font.bold != (weight == FontWeight::kBold);
+  auto order = std::tuple(rank, slanted, serif, narrow, other_weight, font.path, font.index);
   return Candidate{std::move(font), std::move(order)};
 }
 
-std::vector<FontFile> ListFonts() {
+std::vector<FontFile> ListFonts(FontWeight weight) {
   std::vector<FontFile> fonts;
   FcConfig* config = FcInitLoadConfigAndFonts();
   if (config == nullptr) return fonts;
@@ -83,7 +84,8 @@ std::vector<FontFile> ListFonts() {
   FcFontSet* found = FcFontList(config, any, wanted);
   std::vector<Candidate> candidates;
   for (int i = 0; found != nullptr && i < found->nfont; ++i) {
-    if (auto candidate = ReadPattern(found->fonts[i])) candidates.push_back(*std::move(candidate));
+    if (auto candidate = ReadPattern(found->fonts[i], weight))
+      candidates.push_back(*std::move(candidate));
   }
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
@@ -101,15 +103,20 @@ bool Has(const FontFile& font, char32_t c) {
 
 }  // namespace
 
-const FontCatalogue& FontCatalogue::System() {
-  static const FontCatalogue catalogue = [] {
-    FontCatalogue read(ListFonts());
-    for (const std::string& line : read.Missing()) {
+const FontCatalogue& FontCatalogue::System(FontWeight weight) {
+  const auto read = [](FontWeight wanted) {
+    FontCatalogue found(ListFonts(wanted), wanted);
+    for (const std::string& line : found.Missing()) {
       Log(line);
     }
-    return read;
-  }();
-  return catalogue;
+    return found;
+  };
+  if (weight == FontWeight::kRegular) {
+    static const FontCatalogue regular = read(FontWeight::kRegular);
+    return regular;
+  }
+  static const FontCatalogue bold = read(FontWeight::kBold);
+  return bold;
 }
 
 std::optional<std::size_t> FontCatalogue::FirstWith(std::u32string_view cluster, bool color) const {
@@ -142,8 +149,8 @@ std::vector<std::string> FontCatalogue::Missing() const {
         [this](char32_t c) { return FontFor(std::u32string_view(&c, 1), c > 0xffff).has_value(); });
     if (there) continue;
     lines.push_back(absl::StrCat("no font for ", promise.script,
-                                 ": in the wearer's picture such text is boxes; install Debian's ",
-                                 promise.package, " and start the server again"));
+                                 ": such text is drawn as boxes; install Debian's ",
+                                 promise.package, " and start again"));
   }
   return lines;
 }
