@@ -5,19 +5,36 @@
 
 namespace saccade {
 
+Similarity3 AlignPoses(const std::vector<PosePair>& pairs) {
+  const double n = static_cast<double>(pairs.size());
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
+  for (const PosePair& pair : pairs) {
+    const Eigen::Vector4d turn =
+        (pair.truth.rotation * pair.estimate.rotation.conjugate()).coeffs();
+    sum += turn.dot(sum) < 0 ? -turn : turn;
+    from += pair.estimate.translation / n;
+    to += pair.truth.translation / n;
+  }
+  Similarity3 aligned;
+  aligned.rotation = Eigen::Quaterniond(sum.normalized());
+  double both = 0.0, squared = 0.0;
+  for (const PosePair& pair : pairs) {
+    const Eigen::Vector3d turned = aligned.rotation * (pair.estimate.translation - from);
+    both += turned.dot(pair.truth.translation - to);
+    squared += turned.squaredNorm();
+  }
+  if (both > 0.0) aligned.scale = both / squared;
+  aligned.translation = to - aligned.scale * (aligned.rotation * from);
+  return aligned;
+}
+
 std::optional<MergeError> ScoreMerge(const std::vector<PosePair>& carrier,
                                      const std::vector<PosePair>& carried,
                                      const Similarity3& carrier_from_carried,
                                      const Matrix7d& covariance) {
   if (carrier.size() < 3 || carried.size() < 3) return std::nullopt;
-  std::vector<Eigen::Vector3d> estimated, true_points;
-  for (const PosePair& pair : carrier) {
-    estimated.push_back(pair.estimate.translation);
-    true_points.push_back(pair.truth.translation);
-  }
-  const Similarity aligned = AlignPoints(estimated, true_points, Alignment::kSim3);
-  const Similarity3 truth_from_carrier =
-      Similarity3::FromRigid(aligned.target_from_source, aligned.scale);
+  const Similarity3 truth_from_carrier = AlignPoses(carrier);
   MergeError error;
   error.poses = carried.size();
   const double n = static_cast<double>(carried.size());
@@ -41,7 +58,7 @@ std::optional<MergeError> ScoreMerge(const std::vector<PosePair>& carrier,
   error.rms_deg = std::sqrt(error.rms_deg) * kDegrees;
   Eigen::Matrix<double, 3, 7> by;
   by << Eigen::Matrix3d::Identity(), -Skew(middle), middle;
-  error.sigma_m = aligned.scale * std::sqrt((by * covariance * by.transpose()).trace());
+  error.sigma_m = truth_from_carrier.scale * std::sqrt((by * covariance * by.transpose()).trace());
   return error;
 }
 

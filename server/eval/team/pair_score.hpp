@@ -7,9 +7,13 @@
 
 namespace saccade {
 
-/// How far off a merge is: one map, aligned to truth by the similarity of its own trajectory,
-/// carries the other's trajectory, and that is compared with truth. Root mean squares hold the
-/// other's own errors too; what all its poses share is the merge's.
+/// truth_from_map by a trajectory's own poses: rotation by orientations, scale and place by
+/// positions. Where the way was short, positions alone say little of how the map is turned.
+Similarity3 AlignPoses(const std::vector<PosePair>& pairs);
+
+/// How far off a merge is: one map, aligned to truth by the similarity of its own poses, carries
+/// the other's trajectory, and that is compared with truth. Root mean squares hold the other's own
+/// errors too; what all its poses share is the merge's.
 struct MergeError {
   std::size_t poses = 0;
   double off_m = 0, off_deg = 0;  // shared by all poses: mean of position and of rotation errors

@@ -12,7 +12,7 @@ namespace saccade {
 namespace {
 
 constexpr double kSamePlace_px = 6.0;  // points closer than this are no rivals of each other
-constexpr double kGuided_px = 6.0;     // at 640 pixels
+constexpr double kBack_px = 6.0;       // at 640 pixels
 constexpr int kGuidedHamming = 56;
 constexpr double kMostScale = 1.9, kMostAside_rad = 0.6, kBorder_px = 24.0;
 constexpr int kColumns = 4, kRows = 3, kFewestInCell = 6;
@@ -102,8 +102,8 @@ std::optional<Eigen::Vector2d> ShouldBeAt(const PlaceView& seen_by, std::size_t 
 
 /// The point of `query` near `pixel` that looks like it, or nothing.
 std::optional<std::size_t> LooksLike(const DescribedPoint& look, const Eigen::Vector2d& pixel,
-                                     const PlaceView& query) {
-  const double radius = kGuided_px * query.camera->width() / 640.0;
+                                     const PlaceView& query, double radius_px) {
+  const double radius = radius_px * query.camera->width() / 640.0;
   std::optional<std::size_t> best;
   int least = kGuidedHamming + 1;
   for (std::size_t q = 0; q < query.described.size(); ++q) {
@@ -139,13 +139,13 @@ struct Cells {
 
 /// `seen_by`'s points in the picture of `query`.
 void Look(const std::shared_ptr<const PlaceView>& seen_by, const PlaceView& query,
-          const Rigid3& world_from_camera, Presence& presence, Cells& cells,
+          const Rigid3& world_from_camera, double radius_px, Presence& presence, Cells& cells,
           std::vector<CommonPoint>* found) {
   for (std::size_t m = 0; m < seen_by->described.size(); ++m) {
     if (!seen_by->Knows(m)) continue;
     const auto pixel = ShouldBeAt(*seen_by, m, world_from_camera, *query.camera);
     if (!pixel) continue;
-    const auto like = LooksLike(seen_by->described[m], *pixel, query);
+    const auto like = LooksLike(seen_by->described[m], *pixel, query, radius_px);
     ++presence.expected;
     presence.found += like ? 1 : 0;
     cells.Add(*pixel, *query.camera, like.has_value());
@@ -165,7 +165,7 @@ Presence PresentBack(const CommonPlace& place, const PlaceBook& map) {
     Cells cells;
     Presence one;
     const Rigid3 there = query_from_mapped.Move(view->world_from_camera());
-    Look(place.query, *view, there, one, cells, nullptr);
+    Look(place.query, *view, there, kBack_px, one, cells, nullptr);
     cells.Judge(one);
     presence.expected += one.expected;
     presence.found += one.found;
@@ -220,11 +220,11 @@ Similarity3 CommonPlace::MappedFromQueryWorld() const {
 }
 
 Presence PresentIn(const PlaceView& query, const Rigid3& mapped_from_camera, double distance,
-                   const PlaceBook& map, std::vector<CommonPoint>* found) {
+                   const PlaceBook& map, std::vector<CommonPoint>* found, double radius_px) {
   Presence presence;
   Cells cells;
   for (const auto& view : map.Near(mapped_from_camera, distance, kNearViews)) {
-    Look(view, query, mapped_from_camera, presence, cells, found);
+    Look(view, query, mapped_from_camera, radius_px, presence, cells, found);
   }
   cells.Judge(presence);
   if (found != nullptr) {

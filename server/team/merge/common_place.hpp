@@ -55,8 +55,10 @@ std::optional<CommonPlace> FindCommonPlace(const std::shared_ptr<const PlaceView
                                            const PlaceBook& map, const CommonPlaceOptions& options);
 
 /// What of `map` should be in a picture taken from `mapped_from_camera`, and what of it `query`
-/// shows there. `found`, if given, receives the pairs, each point of `query` once.
+/// shows within `radius_px` (at 640 pixels) of there. `found`, if given, receives the pairs, each
+/// point of `query` once.
 Presence PresentIn(const PlaceView& query, const Rigid3& mapped_from_camera, double distance,
-                   const PlaceBook& map, std::vector<CommonPoint>* found = nullptr);
+                   const PlaceBook& map, std::vector<CommonPoint>* found = nullptr,
+                   double radius_px = 6.0);
 
 }  // namespace saccade

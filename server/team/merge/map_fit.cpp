@@ -20,24 +20,13 @@ struct Sighting {
   int cluster = 0;
 };
 
-/// The view as it was told last, if it is still there.
-const PlaceView* Newest(const PlaceView* view, const PlaceBook& book) {
-  const auto now = book.Find(view->told.frame);
-  const bool same = now && book.generation() == view->told.generation &&
-                    now->described.size() == view->described.size();
-  return same ? now.get() : view;
-}
-
-std::vector<Sighting> Collect(std::span<const JoinedPlace* const> places, const PlaceBook& own,
-                              const PlaceBook& other) {
+std::vector<Sighting> Collect(std::span<const JoinedPlace* const> places) {
   std::vector<Sighting> sightings;
   for (std::size_t k = 0; k < places.size(); ++k) {
     const bool in_own = places[k]->mapped == MapSide::kOwn;
-    const PlaceBook& mapped_book = in_own ? own : other;
-    const PlaceBook& query_book = in_own ? other : own;
-    const PlaceView* query = Newest(places[k]->place.query.get(), query_book);
+    const PlaceView* query = places[k]->place.query.get();
     for (const CommonPoint& common : places[k]->place.points) {
-      const PlaceView* mapped = Newest(common.mapped.get(), mapped_book);
+      const PlaceView* mapped = common.mapped.get();
       if (mapped->Knows(common.mapped_point)) {
         sightings.push_back({in_own, mapped->points_in_world[common.mapped_point], query,
                              query->described[common.query_point].pixel, static_cast<int>(k)});
@@ -117,9 +106,9 @@ Equations Build(const std::vector<Sighting>& sightings, const Similarity3& at, b
 
 }  // namespace
 
-std::optional<MapFit> FitMaps(std::span<const JoinedPlace* const> places, const PlaceBook& own,
-                              const PlaceBook& other, const Similarity3& initial, bool metric) {
-  const std::vector<Sighting> sightings = Collect(places, own, other);
+std::optional<MapFit> FitMaps(std::span<const JoinedPlace* const> places,
+                              const Similarity3& initial, bool metric) {
+  const std::vector<Sighting> sightings = Collect(places);
   Similarity3 at = initial;
   Equations now = Build(sightings, at, metric, places.size());
   double damping = 1e-6;

@@ -30,10 +30,10 @@ struct MapFit {
 };
 
 /// Fits the similarity to everything that places show of each other, in both directions, by
-/// reprojection through the lenses (Gauss-Newton, Huber). Views are taken as `own` and `other` have
-/// them now. The covariance is a sandwich over places: points of one picture share their errors.
-/// Nothing: fewer than 24 points agree, or they leave a direction free.
-std::optional<MapFit> FitMaps(std::span<const JoinedPlace* const> places, const PlaceBook& own,
-                              const PlaceBook& other, const Similarity3& initial, bool metric);
+/// reprojection through the lenses (Gauss-Newton, Huber). The covariance is a sandwich over places:
+/// points of one picture share their errors. Nothing: fewer than 24 points agree, or they leave a
+/// direction free.
+std::optional<MapFit> FitMaps(std::span<const JoinedPlace* const> places,
+                              const Similarity3& initial, bool metric);
 
 }  // namespace saccade

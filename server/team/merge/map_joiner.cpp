@@ -11,7 +11,8 @@ constexpr int kFewestKnown = 30;       // points of a view before it is looked f
 constexpr double kMoreKnown = 1.5;     // then it is looked for again
 constexpr double kMetreOff = 0.15;     // log scale between maps that both are metric
 constexpr int kFewestExpected = 30;    // in a view before it can contradict
-constexpr double kContradicts = 0.08;  // share found
+constexpr double kContradicts = 0.08;  // share found, within
+constexpr double kTested_px = 25.0;    // of there, at 640 pixels: maps are bent
 constexpr std::size_t kMostTested = 25;
 constexpr std::size_t kNewest = 12;  // places, of which half must agree
 
@@ -53,6 +54,21 @@ bool MapJoiner::WorthLooking(MapSide side, const PlaceView& view) {
   return true;
 }
 
+void MapJoiner::Renew(MapSide side, const std::shared_ptr<const PlaceView>& view) {
+  const auto same = [&](const PlaceView& known) {
+    return known.told.frame == view->told.frame && known.described.size() == view->described.size();
+  };
+  for (JoinedPlace& place : places_) {
+    if (place.mapped != side) {
+      if (same(*place.place.query)) place.place.query = view;
+      continue;
+    }
+    for (CommonPoint& point : place.place.points) {
+      if (same(*point.mapped)) point.mapped = view;
+    }
+  }
+}
+
 bool MapJoiner::WorkOn(Told told) {
   PlaceBook& book = told.side == MapSide::kOwn ? own_ : other_;
   const Timestamp now_ns = told.keyframe.told_time_ns;
@@ -64,7 +80,9 @@ bool MapJoiner::WorkOn(Told told) {
     join_.reset();
   }
   const auto view = book.Take(std::move(told.keyframe));
-  if (!view || !WorthLooking(told.side, *view)) return changed;
+  if (!view) return changed;
+  Renew(told.side, view);
+  if (!WorthLooking(told.side, *view)) return changed;
   const MapSide in = Opposite(told.side);
   auto place = FindCommonPlace(view, this->book(in), options_.place);
   if (!place) return changed;
@@ -99,7 +117,7 @@ bool MapJoiner::Agrees(const JoinedPlace& place, const Similarity3& own_from_oth
     return false;
   }
   return !place.place.scale || std::abs(std::log(*place.place.scale / mapped_from_query.scale)) <
-                                   2 * options_.agree_share;
+                                   options_.agree_log_scale;
 }
 
 bool MapJoiner::FromDifferentPoses(const std::vector<const JoinedPlace*>& places) const {
@@ -125,8 +143,9 @@ void MapJoiner::TestViews(MapJoin& join) const {
     std::size_t k = 0;
     for (const auto& [frame, view] : here.views()) {
       if (k++ % every != 0) continue;
-      const Presence presence = PresentIn(*view, there_from_here.Move(view->world_from_camera()),
-                                          there_from_here.scale * view->distance, there);
+      const Presence presence =
+          PresentIn(*view, there_from_here.Move(view->world_from_camera()),
+                    there_from_here.scale * view->distance, there, nullptr, kTested_px);
       if (presence.expected < kFewestExpected) continue;
       ++join.views_tested;
       join.views_contradicting += presence.share() < kContradicts ? 1 : 0;
@@ -159,10 +178,12 @@ bool MapJoiner::Judge(Timestamp now_ns) {
     return was;
   };
   if (std::ssize(best) < options_.places_needed ||
-      2 * of_newest < static_cast<std::ptrdiff_t>(newest) || !FromDifferentPoses(best)) {
+      2.0 * (join_ ? options_.reluctance : 1.0) * static_cast<double>(of_newest) <
+          static_cast<double>(newest) ||
+      !FromDifferentPoses(best)) {
     return give_up();
   }
-  const auto fit = FitMaps(best, own_, other_, proposal, metric);
+  const auto fit = FitMaps(best, proposal, metric);
   if (!fit) return give_up();
   MapJoin join;
   join.fit = *fit;
@@ -170,7 +191,10 @@ bool MapJoiner::Judge(Timestamp now_ns) {
   join.places = static_cast<int>(best.size());
   join.disagreeing = static_cast<int>(places_.size() - best.size());
   TestViews(join);
-  if (join.views_contradicting > options_.most_contradicting * join.views_tested) return give_up();
+  if (join.views_contradicting >
+      (join_ ? options_.reluctance : 1.0) * options_.most_contradicting * join.views_tested) {
+    return give_up();
+  }
   join.since_ns = join_ ? join_->since_ns : now_ns;
   join.revision = ++revision_;
   join_ = join;

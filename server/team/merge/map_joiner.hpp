@@ -12,15 +12,19 @@
 namespace saccade {
 
 struct MapJoinerOptions {
-  CommonPlaceOptions place;
+  CommonPlaceOptions place = {};
   Timestamp hold_ns = 100'000'000;  // how long a keyframe may be late (slam-spec 11, T37)
   int places_needed = 3;            // of different pictures, that agree
   std::size_t places_kept = 60;     // newest
   double agree_share = 0.1;         // of the distance: between where two places have a camera
   double agree_rad = 0.06;
-  double moved_share = 0.05;        // of the distance, or
-  double turned_rad = 0.1;          // between the pictures that agree: one view proves nothing
+  double agree_log_scale =
+      0.4;                    // of maps without metres: one that turns on the spot has many units
+  double moved_share = 0.05;  // of the distance, or
+  double turned_rad = 0.1;    // between the pictures that agree: one view proves nothing
   double most_contradicting = 0.2;  // of views in which the other map should show
+  /// What is once a join is given up where it would not be half as good as it had to be.
+  double reluctance = 2.0;
 };
 
 /// Two maps that are one.
@@ -64,6 +68,8 @@ class MapJoiner {
     TeamKeyframe keyframe;
   };
   bool WorkOn(Told told);
+  /// Places take a view of `side` as it is now.
+  void Renew(MapSide side, const std::shared_ptr<const PlaceView>& view);
   /// Whether more is known of this view than when it was looked for last.
   bool WorthLooking(MapSide side, const PlaceView& view);
   bool Judge(Timestamp now_ns);
