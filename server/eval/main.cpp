@@ -86,11 +86,23 @@ void AddRun(CLI::App& app, RunArguments& arguments) {
 
 void AddTeam(CLI::App& app, TeamArguments& arguments) {
   CLI::App* team = app.add_subcommand(
-      "team", "Many in one filter: robots that see each other, or static cameras and a wand");
-  team->add_option("--dataset", arguments.dataset,
+      "team",
+      "Many in one filter: robots that see each other, or static cameras and a wand; two "
+      "recordings whose maps find each other");
+  team->add_option("--dataset", arguments.datasets,
                    "Folder in the form of UTIAS MRCLAM, or with cameras.yaml, detections.csv and "
-                   "wand_tags.csv")
-      ->required();
+                   "wand_tags.csv; or twice: two recordings of one place")
+      ->take_all();
+  team->add_option("--foreign", arguments.foreign_pairs,
+                   "Instead: so many pairs of rooms that share posters or furniture; none is to be "
+                   "merged")
+      ->check(CLI::Range(1, 1000000));
+  team->add_option("--seed", arguments.seed, "Seed of --foreign")
+      ->check(NotNegative())
+      ->capture_default_str();
+  team->add_option("--frames", arguments.frames,
+                   "Half-open range A:B of frames; twice, for each of two recordings")
+      ->take_all();
   team->add_option("--out", arguments.out, "Folder for report.json and the trajectories (TUM)")
       ->required();
   team->add_option("--set", arguments.set, "One option as team.key=value; may be repeated")

@@ -9,6 +9,7 @@
 
 #include "server/eval/output_file.hpp"
 #include "server/eval/team/mrclam_run.hpp"
+#include "server/eval/team/pair_command.hpp"
 #include "server/eval/team/team_settings.hpp"
 #include "server/eval/team/wand_run.hpp"
 #include "shared/io/regular_file.hpp"
@@ -49,7 +50,7 @@ Json ScoreJson(const MrclamScore& score) {
 }
 
 absl::StatusOr<Json> RunRobots(const TeamArguments& arguments, const TeamSettings& settings) {
-  const absl::StatusOr<MrclamData> data = LoadMrclam(arguments.dataset);
+  const absl::StatusOr<MrclamData> data = LoadMrclam(arguments.datasets.front());
   if (!data.ok()) return data.status();
   const absl::StatusOr<MrclamResult> result = RunMrclam(*data, settings);
   if (!result.ok()) return result.status();
@@ -107,7 +108,7 @@ absl::StatusOr<Json> RunRobots(const TeamArguments& arguments, const TeamSetting
 }
 
 absl::StatusOr<Json> RunCameras(const TeamArguments& arguments, const TeamSettings& settings) {
-  const absl::StatusOr<WandData> data = LoadWand(arguments.dataset, settings.tag_side_m);
+  const absl::StatusOr<WandData> data = LoadWand(arguments.datasets.front(), settings.tag_side_m);
   if (!data.ok()) return data.status();
   const absl::StatusOr<WandResult> result = RunWand(*data);
   if (!result.ok()) return result.status();
@@ -186,12 +187,19 @@ std::string Table(const Json& report) {
 }  // namespace
 
 absl::Status TeamCommand(const TeamArguments& arguments) {
+  if (arguments.foreign_pairs > 0) return ForeignCommand(arguments);
+  if (arguments.datasets.size() == 2) return PairCommand(arguments);
+  if (arguments.datasets.size() != 1) {
+    return absl::InvalidArgumentError(
+        "--dataset: one, or two recordings whose maps are to meet; or --foreign");
+  }
+  const Path& dataset = arguments.datasets.front();
   const absl::StatusOr<TeamSettings> settings = ParseTeamSettings(arguments.set);
   if (!settings.ok()) return settings.status();
-  const bool robots = MayExist(arguments.dataset / "Barcodes.dat");
-  if (!robots && !MayExist(arguments.dataset / "detections.csv")) {
+  const bool robots = MayExist(dataset / "Barcodes.dat");
+  if (!robots && !MayExist(dataset / "detections.csv")) {
     return absl::NotFoundError(
-        absl::StrCat(arguments.dataset.string(),
+        absl::StrCat(dataset.string(),
                      ": is neither robots in a plane (Barcodes.dat, Robot1_Odometry.dat, ...) nor "
                      "static cameras "
                      "and a wand (cameras.yaml, detections.csv, wand_tags.csv)"));
