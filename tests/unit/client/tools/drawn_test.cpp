@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-namespace saccade::tools {
+namespace saccade::tools::drawn_test {
 namespace {
 
 View Facing(double yaw_rad, const Eigen::Vector3d& eye = Eigen::Vector3d::Zero()) {
@@ -65,4 +65,4 @@ TEST(Drawn, AStrokeBeginsAtItsAnchorAndIsSmoothedBetweenItsEnds) {
 }
 
 }  // namespace
-}  // namespace saccade::tools
+}  // namespace saccade::tools::drawn_test

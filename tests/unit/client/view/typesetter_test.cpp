@@ -8,7 +8,7 @@
 
 #include "client/view/theme.hpp"
 
-namespace saccade::view {
+namespace saccade::view::typesetter_test {
 namespace {
 
 using ::testing::AnyOf;
@@ -142,4 +142,4 @@ TEST_F(Letters, LinesAreBrokenInTheOrderInWhichTheyAreRead) {
 }
 
 }  // namespace
-}  // namespace saccade::view
+}  // namespace saccade::view::typesetter_test

@@ -12,7 +12,7 @@
 #include "server/tracker/carried_squares.hpp"
 #include "server/tracker/square_landmarks.hpp"
 
-namespace saccade {
+namespace saccade::carried_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -154,7 +154,7 @@ TEST(CarriedSquares, CornersAreThePatterns) {
   }
 }
 
-class Carried : public testing::TestWithParam<const char*> {};
+class Carried : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(Carried, AnOpeningDrawerIsFollowedFrameByFrame) {
   CarriedWorld world(GetParam(), 3);
@@ -191,7 +191,7 @@ TEST_P(Carried, AnOpeningDrawerIsFollowedFrameByFrame) {
   EXPECT_LT(off_px[p95], 0.5);
 }
 
-INSTANTIATE_TEST_SUITE_P(Families, Carried, testing::Values("apriltag36h11", "aruco_4x4_50"));
+INSTANTIATE_TEST_SUITE_P(Families, Carried, ::testing::Values("apriltag36h11", "aruco_4x4_50"));
 
 TEST(CarriedSquares, AHandBeforeItLeavesItWhereItWas) {
   CarriedWorld world("apriltag36h11", 5);
@@ -282,4 +282,4 @@ TEST(CheckCarried, SaysWhatThereIs) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::carried_test

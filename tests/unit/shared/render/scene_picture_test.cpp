@@ -14,7 +14,7 @@
 #include "server/gl/gl_context.hpp"
 #include "shared/models/shapes.hpp"
 
-namespace saccade {
+namespace saccade::scene_picture_test {
 namespace {
 
 constexpr std::uint8_t kShadow = 200;  // alpha: shadows have less
@@ -121,4 +121,4 @@ TEST(ScenePicture, ShowsThroughTheLensWhatRaysMeetFirst) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::scene_picture_test

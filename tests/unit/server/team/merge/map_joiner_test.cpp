@@ -7,7 +7,7 @@
 
 #include "server/eval/team/foreign_rooms.hpp"
 
-namespace saccade {
+namespace saccade::map_joiner_test {
 namespace {
 
 struct Walkers {
@@ -112,4 +112,4 @@ TEST(MapJoiner, AMapThatIsThrownAwayIsAnotherMap) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::map_joiner_test
