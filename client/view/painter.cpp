@@ -10,9 +10,22 @@ namespace saccade::view {
 namespace {
 
 constexpr float kMaxRing = 120;
+constexpr float kMostOfWidth = 0.6f;  // a longer label hides more than it says
+constexpr float kLetter = 7.5f;       // about as wide
 
 bool Contains(const std::vector<std::string>& ids, const std::string& id) {
   return !id.empty() && std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
+/// Its first characters; of a long one fewer than 40, however wide the pane.
+std::string Shortened(const std::string& text, float room) {
+  const std::size_t most = static_cast<std::size_t>(std::clamp(room, 8.0f, 40.0f));
+  std::size_t count = 0, end = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if ((static_cast<unsigned char>(text[i]) & 0xc0) == 0x80) continue;
+    if (++count == most) end = i;
+  }
+  return count <= most ? text : text.substr(0, end) + "…";
 }
 
 std::vector<ImVec2> Circle(ImVec2 centre, float radius) {
@@ -136,12 +149,7 @@ void Painter::Draw(const Marks& marks, const std::vector<std::string>& accented)
 void Painter::Tag(const Label& label, ImU32 color, bool whole, std::vector<Rect>* taken) {
   std::string text = label.text;
   std::replace(text.begin(), text.end(), '\n', ' ');
-  const std::size_t most = 40;  // bytes, never within a character
-  if (!whole && text.size() > most) {
-    std::size_t end = most - 1;
-    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
-    text = text.substr(0, end) + "…";
-  }
+  if (!whole) text = Shortened(text, kMostOfWidth * pane_.width / (kLetter * unit_));
   const float inset = 6 * unit_;
   const float wrap = whole ? std::min(300 * unit_, pane_.width - 4 * inset) : 0.0f;
   text = Types().Set(text, wrap);
@@ -150,8 +158,11 @@ void Painter::Tag(const Label& label, ImU32 color, bool whole, std::vector<Rect>
   const ImVec2 extent = font->CalcTextSizeA(size, 1e6f, wrap, text.c_str());
   const ImVec2 at = At(label.at_px);
   Rect box{at.x + inset, at.y - extent.y - 8 * unit_, extent.x + 2 * inset, extent.y + 4 * unit_};
-  if (whole) {
+  const bool in_view = at.x > pane_.x && at.x < pane_.right();
+  if (whole || in_view) {
     box.x = std::clamp(box.x, pane_.x, std::max(pane_.x, pane_.right() - box.width));
+  }
+  if (whole) {
     box.y = std::clamp(box.y, pane_.y, std::max(pane_.y, pane_.bottom() - box.height));
   }
   if (taken != nullptr) {

@@ -67,9 +67,7 @@ absl::Status Window::Start() {
   io.IniFilename = nullptr;  // where things stand is ours to keep
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   ImGui_ImplGlfw_InitForOpenGL(window_, /*install_callbacks=*/true);  // and calls ours
-  // Instead of its own, which knows nothing beyond U+FFFF.
-  glfwSetCharCallback(window_,
-                      [](GLFWwindow* w, unsigned codepoint) { Self(w)->OnCharacter(codepoint); });
+  ListenToKeys();
   ShareClipboard();
   ImGui_ImplOpenGL3_Init("#version 330 core");
   return absl::OkStatus();
@@ -104,9 +102,6 @@ void Window::Listen() {
   glfwSetScrollCallback(window_, [](GLFWwindow* w, double /*dx*/, double dy) {
     Self(w)->Add({.kind = InputEvent::Kind::kScroll, .scroll = static_cast<float>(dy)});
   });
-  glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
-    Self(w)->OnKey(key, scancode, action, mods);
-  });
   glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** files) {
     if (count > 0) Self(w)->Add({.kind = InputEvent::Kind::kDrop, .file = files[0]});
   });
@@ -116,6 +111,28 @@ void Window::Listen() {
   glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int focused) {
     Self(w)->refresh_ = true;
     if (focused == 0) Self(w)->Add({.kind = InputEvent::Kind::kLet});
+  });
+}
+
+void Window::ListenToKeys() {
+  glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
+    Self(w)->OnKey(key, scancode, action, mods);
+    const auto tell = [=] { ImGui_ImplGlfw_KeyCallback(w, key, scancode, action, mods); };
+    // Letters come as characters as well: their keys may be missed, and nobody who types waits.
+    const bool modifier = key >= GLFW_KEY_LEFT_SHIFT && key <= GLFW_KEY_RIGHT_SUPER;
+    const bool acts = (key >= GLFW_KEY_ESCAPE && !modifier) || (mods & GLFW_MOD_CONTROL) != 0;
+    if (acts) {
+      Self(w)->keys_.Key(key, action != GLFW_RELEASE, key == GLFW_KEY_TAB, tell);
+    } else {
+      Self(w)->keys_.Character(tell);
+    }
+  });
+  glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned codepoint) {
+    Self(w)->OnCharacter(codepoint);
+    // Not by the backend's, which knows nothing beyond U+FFFF.
+    Self(w)->keys_.Character([codepoint] {
+      ImGui::GetIO().AddInputCharacter(Types().ToField(static_cast<char32_t>(codepoint)));
+    });
   });
 }
 
@@ -160,7 +177,6 @@ void Window::OnKey(int key, int scancode, int action, int mods) {
 
 void Window::OnCharacter(unsigned codepoint) {
   refresh_ = true;
-  ImGui::GetIO().AddInputCharacter(Types().ToField(codepoint));
   if (codepoint >= 0x80) return;
   const char c = absl::ascii_tolower(static_cast<unsigned char>(codepoint));
   InputEvent event;
@@ -229,6 +245,7 @@ void Window::End() {
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glfwSwapBuffers(window_);
   gl_.Finish();
+  if (keys_.Next()) refresh_ = true;
 }
 
 float Window::width() const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/tools/controls.hpp"
+#include "client/view/key_queue.hpp"
 #include "client/view/theme.hpp"
 #include "shared/render/gl_functions.hpp"
 
@@ -79,6 +80,8 @@ class Window {
   void Add(InputEvent event);
   void OnKey(int key, int scancode, int action, int mods);
   void OnCharacter(unsigned codepoint);
+  /// In place of the backend's own, after it was set up.
+  void ListenToKeys();
   void ShareClipboard();
 
   GLFWwindow* window_;
@@ -89,6 +92,7 @@ class Window {
   bool light_ = false, light_shown_ = false;
   bool imgui_ = false, refresh_ = true, repeating_ = false;
   std::vector<InputEvent> input_;
+  KeyQueue keys_;  // to ImGui
 };
 
 }  // namespace saccade::view

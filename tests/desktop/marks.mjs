@@ -102,6 +102,8 @@ async function page(context, { findObject, marked, idsOf }) {
   writeFileSync(file, `%PDF-1.4\n${body}trailer<</Root 1 0 R>>\n`);
   screen.press('u');
   await desktop.until('the picture is in hand', ({ tool }) => tool === 'Picture');
+  await still(context, true); // the page stays in view
+  const redBefore = red(screen.grab());
   const before = idsOf(desktop.look());
   screen.click(await findObject(context, 1));
   await desktop.until('the dialog', ({ editing }) => editing);
@@ -113,7 +115,6 @@ async function page(context, { findObject, marked, idsOf }) {
   screen.input('type', '2');
   await sleep(300);
   context.shot('page-dialog');
-  const redBefore = red(screen.grab());
   screen.press('Return');
   const shown = await desktop.until('the page', marked(before), 30_000);
   const { id } = shown.marks.find((mark) => !before.has(mark.id));
@@ -127,18 +128,24 @@ async function page(context, { findObject, marked, idsOf }) {
     `${kept?.shape}, ${more} red pixels more`,
   );
   screen.press('v', 'Escape');
+  await still(context, false);
 }
 
 /** Text beyond Latin: the fonts are found while it runs. */
 async function scripts(context) {
-  const { desktop, check } = context;
+  const { desktop, screen, check } = context;
   const { frame } = desktop.look().video;
-  const text = 'Ölstand · масло · λάδι · 油位检查 · ☎ ✂ 😀 · שמן';
+  const text = 'שמן · 油位 · زيت · 😀';
+  const said =
+    'Ölstand · масло · λάδι · 油位检查 · ☎ ✂ 😀 🔧 · בדוק את השמן לפני שאתה מתחיל לעבוד · افحص الزيت';
+  context.ask('say', said);
   const where = ['--pixel', '320,200', '--frame', String(frame)];
   context.ask('annotate', ...where, '--shape', 'note', '--text', text);
   await desktop.until('the note', ({ marks }) => marks.some((mark) => mark.text === text));
-  await sleep(1000);
+  screen.press('9');
+  await sleep(1500);
   context.shot('scripts');
+  screen.press('Escape');
   check('a note in six scripts is shown, and the window goes on', true, text);
 }
 

@@ -220,11 +220,7 @@ async function drawn(context) {
   });
   context.shot('map-ink');
   const points = desktop.look().marks.find(({ id }) => id === stroke?.id)?.points;
-  check(
-    'ink is drawn in the map too',
-    stroke?.shape === 'ink' && points > 3,
-    `${points} points`,
-  );
+  check('ink is drawn in the map too', stroke?.shape === 'ink' && points > 3, `${points} points`);
   screen.press('v', 'Escape');
   await desktop.enlarge('video');
   screen.press('Escape', 'Escape');
@@ -281,10 +277,12 @@ async function laser(context) {
     const begin = performance.now();
     screen.input('mousedown', 1);
     const down = performance.now(); // xdotool takes some of it
-    await second.until('the laser', ({ lasers }) => lasers === 1).catch((error) => {
-      const { refused, tool } = desktop.look();
-      throw new Error(`${tool}, refused ${JSON.stringify(refused)}: ${error.message}`);
-    });
+    await second
+      .until('the laser', ({ lasers }) => lasers === 1)
+      .catch((error) => {
+        const { refused, tool } = desktop.look();
+        throw new Error(`${tool}, refused ${JSON.stringify(refused)}: ${error.message}`);
+      });
     const at = performance.now();
     for (let i = 0; i < 5; ++i) screen.move([x + 4 * i, y]);
     other.shot(join(folder, 'laser.png'));
@@ -320,7 +318,7 @@ async function head(context) {
     turning.lease === 2,
     `${turning.gaze}; ${turning.refused.video || 'lease held'}`,
   );
-  await desktop.until('it holds', ({ arrived }) => arrived, 15_000);
+  await desktop.until('it holds', ({ arrived }) => arrived, 60_000);
   context.shot('gaze');
   check(
     'and it holds what was clicked',
