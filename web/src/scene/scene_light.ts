@@ -157,7 +157,7 @@ export function wipesDepth(): THREE.Mesh {
   mesh.renderOrder = 2.5;
   mesh.frustumCulled = false;
   mesh.onBeforeRender = (renderer) => {
-    (renderer as THREE.WebGLRenderer).state.buffers.depth.setMask(true); // else it clears nothing
+    renderer.state.buffers.depth.setMask(true); // else it clears nothing
     renderer.clearDepth();
   };
   return mesh;

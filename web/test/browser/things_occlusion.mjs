@@ -50,7 +50,7 @@ const toObject = ({ base, size }, name, material) => ({
   },
 });
 
-function score({ alpha, width, height, pose }, intrinsics, thing, real) {
+export function score({ alpha, width, height, pose }, intrinsics, thing, real) {
   const [x, y, z, ...rotation] = pose.split(' ').map(Number);
   const camera = { ...intrinsics, distortion: [...intrinsics.distortion] };
   const counts = { seen: [0, 0], hidden: [0, 0], thin: 0 };
