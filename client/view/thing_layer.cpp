@@ -13,8 +13,8 @@
 namespace saccade::view {
 namespace {
 
-constexpr int kCellPx = 8;  // of the grid that bends the picture: straight within
-constexpr double kSupersampling = 1.0;
+constexpr int kCellPx = 8;              // of the grid that bends the picture: straight within
+constexpr double kSupersampling = 2.0;  // of the edges of what hides, as on the server
 constexpr std::array<int, 2> kColored = {3, 4};
 constexpr std::array<float, 4> kEdge = {0.545f, 0.565f, 0.592f, 1.0f};
 

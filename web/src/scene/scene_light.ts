@@ -157,6 +157,7 @@ export function wipesDepth(): THREE.Mesh {
   mesh.renderOrder = 2.5;
   mesh.frustumCulled = false;
   mesh.onBeforeRender = (renderer) => {
+    renderer.state.buffers.depth.setMask(true); // else it clears nothing
     renderer.clearDepth();
   };
   return mesh;

@@ -50,7 +50,7 @@ const toObject = ({ base, size }, name, material) => ({
   },
 });
 
-function score({ alpha, width, height, pose }, intrinsics, thing, real) {
+export function score({ alpha, width, height, pose }, intrinsics, thing, real) {
   const [x, y, z, ...rotation] = pose.split(' ').map(Number);
   const camera = { ...intrinsics, distortion: [...intrinsics.distortion] };
   const counts = { seen: [0, 0], hidden: [0, 0], thin: 0 };
@@ -105,8 +105,11 @@ export async function occluded(context) {
   for (const [i, box] of real.entries()) await put(box, `real ${i}`, SceneMaterial.REAL);
   const layer = ann.page.locator('.scene-layer');
   await when(async () => (await layer.getAttribute('data-things')) === '6');
-  await new Promise((resolve) => setTimeout(resolve, 1500)); // and meshes are made
-  const drawn = await when(() => overlay(context), 30_000);
+  const drawn = await when(async () => {
+    const now = await overlay(context); // meshes are made a picture later
+    return now && [...now.alpha].some((one) => one.charCodeAt(0) > DRAWN) && now;
+  }, 40_000);
+  if (!drawn) return check('what is real hides a virtual box (T33)', false, 'nothing is drawn');
   const { seen, hidden, thin } = score(drawn, intrinsics, thing, real);
   const [seenIou, hiddenIou] = [seen, hidden].map(([both, either]) => both / either);
   check(
