@@ -10,12 +10,12 @@
 namespace saccade {
 namespace {
 
-constexpr float kSmoothed_px = 0.8F;
+constexpr double kSmoothed_px = 0.8;
 // Mean difference of a bit from the threshold: noise decodes as something, but not clearly.
 constexpr float kLeastMargin = 5;
-// Tags of a dozen pixels are found when they are twice as large.
 // In smaller tags the white cells next to the border draw on lines of our own.
 constexpr double kLinesFrom_px = 56;
+// Tags of a dozen pixels are found when they are twice as large.
 constexpr double kEnlarged = 2.0;
 constexpr int kMostEnlargedPixels = 3'000'000;
 
@@ -36,14 +36,13 @@ ApriltagDetector::ApriltagDetector(std::vector<TagFamily> families)
   }
   detector_->nthreads = 1;
   detector_->quad_decimate = 1.0F;
+  detector_->quad_sigma = 0.0F;  // it would smooth the caller's own picture
   detector_->refine_edges = true;
 }
 
 ApriltagDetector::~ApriltagDetector() { apriltag_detector_clear_families(detector_.get()); }
 
-void ApriltagDetector::Look(const cv::Mat& grey, double scale, float smoothed_px,
-                            std::vector<MarkerSighting>& found) {
-  detector_->quad_sigma = smoothed_px;
+void ApriltagDetector::Look(const cv::Mat& grey, double scale, std::vector<MarkerSighting>& found) {
   image_u8_t image = {grey.cols, grey.rows, static_cast<std::int32_t>(grey.step),
                       const_cast<std::uint8_t*>(grey.ptr<std::uint8_t>())};
   const std::unique_ptr<zarray_t, FreeDetections> detections(
@@ -76,12 +75,14 @@ void ApriltagDetector::Look(const cv::Mat& grey, double scale, float smoothed_px
 std::vector<MarkerSighting> ApriltagDetector::Detect(const cv::Mat& grey) {
   std::vector<MarkerSighting> found;
   if (grey.empty() || grey.type() != CV_8UC1) return found;
-  Look(grey, 1.0, 0, found);
-  Look(grey, 1.0, kSmoothed_px, found);
+  Look(grey, 1.0, found);
+  cv::Mat smoothed;
+  cv::GaussianBlur(grey, smoothed, {}, kSmoothed_px);
+  Look(smoothed, 1.0, found);
   if (kEnlarged * kEnlarged * grey.cols * grey.rows <= kMostEnlargedPixels) {
     cv::Mat enlarged;
     cv::resize(grey, enlarged, {}, kEnlarged, kEnlarged, cv::INTER_CUBIC);
-    Look(enlarged, kEnlarged, 0, found);
+    Look(enlarged, kEnlarged, found);
   }
   for (MarkerSighting& sighting : found) RefineCorners(grey, kLinesFrom_px, 0, sighting);
   return found;

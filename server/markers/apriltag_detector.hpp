@@ -20,8 +20,7 @@ class ApriltagDetector : public MarkerDetector {
   std::vector<MarkerSighting> Detect(const cv::Mat& grey) override;
 
  private:
-  void Look(const cv::Mat& grey, double scale, float smoothed_px,
-            std::vector<MarkerSighting>& found);
+  void Look(const cv::Mat& grey, double scale, std::vector<MarkerSighting>& found);
 
   std::vector<TagFamily> families_;
   struct Destroy {

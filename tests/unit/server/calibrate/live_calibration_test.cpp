@@ -17,6 +17,7 @@
 
 #include "server/calibrate/calibration_desk.hpp"
 #include "server/capture/camera_file.hpp"
+#include "server/markers/tag_family.hpp"
 
 namespace saccade::live_calibration_test {
 namespace {
@@ -61,6 +62,34 @@ Sheet GridSheet(int dictionary, int columns, int rows, double side_m, double gap
   }
   sheet.origin_px = {edge - 0.5, edge - 0.5};
   sheet.size_m = {columns * (side_m + gap_m), rows * (side_m + gap_m)};
+  return sheet;
+}
+
+/// Kalibr's: ids rise from the lower left, small black squares where the corners of four meet.
+Sheet AprilGridSheet() {
+  constexpr int kColumns = 5, kRows = 4, kSide = 100, kGap = 30, kPitch = kSide + kGap, kEdge = 40;
+  Sheet sheet{{}, 2500, {kEdge - 0.5, kEdge + kRows * kPitch - kGap - 0.5}, true, {}};
+  sheet.print.create(2 * kEdge + kRows * kPitch - kGap, 2 * kEdge + kColumns * kPitch - kGap,
+                     CV_8UC1);
+  sheet.print.setTo(255);
+  const auto family = TagFamily::Make("apriltag36h11", 2);
+  for (int id = 0; id < kColumns * kRows; ++id) {
+    cv::Mat cells = cv::Mat::zeros(family->cells(), family->cells(), CV_8UC1);
+    for (const TagFamily::Bit& bit : family->Bits(id)) {
+      cells.at<std::uint8_t>(bit.row, bit.column) = bit.bright ? 255 : 0;
+    }
+    const cv::Rect at(kEdge + id % kColumns * kPitch, kEdge + (kRows - 1 - id / kColumns) * kPitch,
+                      kSide, kSide);
+    cv::resize(cells, sheet.print(at), at.size(), 0, 0, cv::INTER_NEAREST);
+  }
+  for (int row = 0; row <= kRows; ++row) {
+    for (int column = 0; column <= kColumns; ++column) {
+      sheet.print(cv::Rect(kEdge + column * kPitch - kGap, kEdge + row * kPitch - kGap, kGap, kGap))
+          .setTo(0);
+    }
+  }
+  sheet.size_m = {(kColumns * kPitch - kGap) / sheet.px_per_m,
+                  (kRows * kPitch - kGap) / sheet.px_per_m};
   return sheet;
 }
 
@@ -127,6 +156,7 @@ TEST_P(LiveTargets, TheLensIsFoundAndSoIsWhatIsMissing) {
 INSTANTIATE_TEST_SUITE_P(
     All, LiveTargets,
     ::testing::Values(Case{"Charuco", "charuco:7x5:0.04:0.03", CharucoSheet},
+                      Case{"AprilGrid", "aprilgrid:5x4:0.04:0.3", AprilGridSheet},
                       Case{
                           "ArucoGrid", "arucogrid:5x4:0.04:0.012:aruco_6x6_250",
                           [] { return GridSheet(cv::aruco::DICT_6X6_250, 5, 4, 0.04, 0.012, 1); }}),

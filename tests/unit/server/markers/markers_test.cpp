@@ -61,7 +61,7 @@ class SheetOfTags : public ::testing::TestWithParam<Pose> {
 };
 
 TEST_P(SheetOfTags, IsReadRightAndFoundWhole) {
-  const cv::Mat grey = picture();
+  const cv::Mat grey = picture(), untouched = grey.clone();
   std::vector<MarkerSighting> read;
   for (const char* name : {"apriltag", "aruco"}) {
     const auto detector = MakeMarkerDetector(name, {{"apriltag36h11"}, 2});
@@ -88,6 +88,7 @@ TEST_P(SheetOfTags, IsReadRightAndFoundWhole) {
   EXPECT_LT(by_variance, 9 * squares);
   EXPECT_GT(by_variance, squares / 9);
   EXPECT_LT(RotationAngle(view->camera_from_grid, pose()), 2e-3);
+  EXPECT_EQ(cv::norm(grey, untouched, cv::NORM_INF), 0) << "a detector has written to it";
 }
 
 INSTANTIATE_TEST_SUITE_P(Poses, SheetOfTags,
