@@ -260,6 +260,7 @@ void Engine::Publish(bool new_frame) {
   last_->tracked.snapshot = published_snapshot_;
   last_->tracked.annotations = wearable_->annotations();
   sink_.OnTracked(last_->tracked);
+  if (new_frame && on_frame_) on_frame_(last_->frame, last_->tracked);
   if (!pictures_->MayShow(last_->frame->id).ok()) return;
   for (const auto& view : views_) new_frame ? view->Post(*last_) : view->Redraw(*last_);
 }

@@ -67,6 +67,11 @@ class Engine : public Backend {
                                                         EventSink& sink);
   ~Engine() override;
 
+  /// Told of each frame after it was published, on the tracker's thread: must not block. Before
+  /// Start().
+  using FrameListener =
+      std::function<void(const std::shared_ptr<const Frame>&, const TrackedEvent&)>;
+  void SetFrameListener(FrameListener listener) { on_frame_ = std::move(listener); }
   void Start();
   /// Ends the threads and answers every command. May be called twice.
   void Stop();
@@ -153,6 +158,8 @@ class Engine : public Backend {
   mutable SceneLayer scene_layer_;
   mutable std::mutex pointers_mutex_;
   std::shared_ptr<const PointerList> pointers_;  // null: none so far
+
+  FrameListener on_frame_;  // null: nobody listens
 
   Runner<StillRequest> stills_;
   std::jthread source_thread_, tracker_thread_, clock_thread_;

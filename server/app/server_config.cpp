@@ -34,7 +34,7 @@ struct Raw {
   std::string config, source, mount = "none", data_dir, camera, grpc = "127.0.0.1:50051",
                               http = "127.0.0.1:8080", gl = "osmesa", speed = "realtime", sim_truth,
                               web_root, public_url, trusted_proxy, tls_certificate, tls_key,
-                              client_ca, audio_in, audio_out, map = "last";
+                              client_ca, audio_in, audio_out, map = "last", team, team_name, team_token;
   std::map<std::string, AccessRole> client_roles;
   bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
   bool overlay_dots = false, overlay_axes = false, overlay_status = false;
@@ -91,6 +91,10 @@ const std::vector<Setting>& Settings() {
       {"audio.in", "--audio-in", &Raw::audio_in,
        "microphone of a wearable without a browser, by ALSA's name: default, plughw:1,0"},
       {"audio.out", "--audio-out", &Raw::audio_out, "its loudspeaker, likewise"},
+      {"team.join", "--team", &Raw::team,
+       "HOST:PORT of another wearer's server: maps find each other, marks are shown in both"},
+      {"team.name", nullptr, &Raw::team_name, "how others see this one; empty: the machine's name"},
+      {"team.token", nullptr, &Raw::team_token, "an invite's token, where the other asks for one"},
       {"overlay.dots", nullptr, &Raw::overlay_dots,
        "the tracker's features in the augmented view, which is the wearer's"},
       {"overlay.axes", nullptr, &Raw::overlay_axes, "the world's axes in it"},
@@ -315,6 +319,23 @@ absl::Status CheckIdentity(const Raw& raw, ServerConfig& config) {
   return absl::OkStatus();
 }
 
+absl::Status CheckTeam(const Raw& raw, ServerConfig& config) {
+  config.team_name = raw.team_name;
+  config.team_token = raw.team_token;
+  if (raw.team_name.size() > 60) return Bad("team.name: at most 60 bytes");
+  if (raw.team.empty()) return absl::OkStatus();
+  absl::StatusOr<Address> address = Address::Parse(raw.team, "--team");
+  if (!address.ok()) return address.status();
+  if (address->port == 0) return Bad("--team: needs the other server's port");
+  if (!address->loopback() && !config.insecure) {
+    return Bad(
+        "--team: the way to another machine is not encrypted yet: say --insecure, or take a "
+        "tunnel that ends on loopback");
+  }
+  config.team = *address;
+  return absl::OkStatus();
+}
+
 absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   ServerConfig config;
   if (raw.source.empty()) return Bad("--source is missing, e.g. --source sim:desk");
@@ -328,6 +349,7 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   config.insecure = raw.insecure;
   if (absl::Status addresses = CheckAddresses(raw, config); !addresses.ok()) return addresses;
   if (absl::Status identity = CheckIdentity(raw, config); !identity.ok()) return identity;
+  if (absl::Status team = CheckTeam(raw, config); !team.ok()) return team;
   absl::StatusOr<GlBackend> gl = ParseGlBackend(raw.gl);
   if (!gl.ok()) return Bad(absl::StrCat("--gl: ", gl.status().ToString()));
   config.gl = *gl;

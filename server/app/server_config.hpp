@@ -50,8 +50,10 @@ struct ServerConfig {
   std::filesystem::path sim_truth;
   // [overlay]: in the augmented view, beside marks
   bool overlay_dots = false, overlay_axes = false, overlay_status = false;
-  std::string map = "last";         // last, new, none, or an id
-  std::string audio_in, audio_out;  // ALSA's names; empty: no voice of the wearer's here
+  std::string map = "last";           // last, new, none, or an id
+  std::optional<Address> team;        // another wearer's server, to join
+  std::string team_name, team_token;  // [team]: how others see this one; what the other asks for
+  std::string audio_in, audio_out;    // ALSA's names; empty: no voice of the wearer's here
   // Only in the file: reasons to change them are rare.
   int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size
   LimitSettings limits;            // [limits]

@@ -12,6 +12,7 @@
 #include "server/app/apply_limits.hpp"
 #include "server/app/engine.hpp"
 #include "server/app/front_door.hpp"
+#include "server/app/make_team.hpp"
 #include "server/app/map_keeper.hpp"
 #include "server/app/memory.hpp"
 #include "server/app/open_source.hpp"
@@ -222,10 +223,12 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   shutdown.SetCommit(
       [&engine](std::chrono::milliseconds limit) { return (*engine)->FlushStore(limit); });
   hub.Connect(engine->get());
+  const std::unique_ptr<TeamRunner> team = MakeTeam(config, **engine);
   RpcServerOptions rpc_options;
   rpc_options.host = config.grpc.host;
   rpc_options.port = config.grpc.port;
   rpc_options.calibration = calibration.get();
+  rpc_options.team = team.get();
   ApplyLimits(config, rpc_options);
   shutdown.SetPhase("making certificates");
   const absl::StatusOr<std::unique_ptr<FrontDoor>> door = FrontDoor::Open(config);
@@ -272,10 +275,13 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
     voice = *std::move(opened);
   }
   (*engine)->Start();
+  std::unique_ptr<TeamLink> link = LinkOf(config, *team);
   shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());
   shutdown.Wait(config.run_for_s);
   voice.reset();
+  link.reset();
+  team->Stop();
   // Streams end first, then browsers, then the threads that answer commands, then calls.
   hub.CloseAll(absl::UnavailableError("the server is shutting down"));
   (*gateway)->Stop();

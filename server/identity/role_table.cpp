@@ -57,6 +57,10 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"TalkService/Say", kAnnotator},
     {"TalkService/Speak", kAnnotator},
 
+    {"TeamService/GetTeam", kViewer},
+    {"TeamService/Follow", kViewer},
+    {"TeamService/Tell", kPilot},  // another wearer's server: its marks come in
+
     {"MapService/Get", kViewer},
     {"MapService/Export", kViewer},
     {"MapService/List", kViewer},

@@ -13,7 +13,7 @@ namespace saccade {
 namespace {
 
 constexpr int kMostSquares = 50;  // along a side
-constexpr double kLeastSide_m = 0.001, kMostSide_m = 10.0;
+constexpr double kLeastCharucoSide_m = 0.001, kMostCharucoSide_m = 10.0;
 constexpr int kMarkersBeside = 2;  // of a corner: with one its place is a guess
 
 }  // namespace
@@ -34,11 +34,11 @@ absl::StatusOr<CharucoPattern> ParseCharuco(const std::string& text) {
         "), the side of a square and of a marker in metres, as in 7x5:0.04:0.03, and where they "
         "are no aruco_4x4_50 the markers' family, as in 7x5:0.04:0.03:aruco_5x5_250"));
   }
-  if (!(pattern.square_m >= kLeastSide_m && pattern.square_m <= kMostSide_m) ||
-      !(pattern.marker_m >= kLeastSide_m && pattern.marker_m < pattern.square_m)) {
+  if (!(pattern.square_m >= kLeastCharucoSide_m && pattern.square_m <= kMostCharucoSide_m) ||
+      !(pattern.marker_m >= kLeastCharucoSide_m && pattern.marker_m < pattern.square_m)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("charuco: '", text, "': a square's side is from ", kLeastSide_m, " to ",
-                     kMostSide_m, " m, and a marker's is less than that"));
+        absl::StrCat("charuco: '", text, "': a square's side is from ", kLeastCharucoSide_m, " to ",
+                     kMostCharucoSide_m, " m, and a marker's is less than that"));
   }
   if (parts.size() == 4) pattern.family = parts[3];
   return pattern;

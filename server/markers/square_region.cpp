@@ -11,7 +11,7 @@ namespace {
 constexpr int kLeastArea_px = 64;
 constexpr double kMostOfPicture = 0.7;
 // One cell of sixteen squares is always red, five can be; blur and shadow take some.
-constexpr int kLeastRedness = 22;
+constexpr int kLeastRegionRedness = 22;
 constexpr double kLeastRed = 0.015, kMostRed = 0.6;
 constexpr double kLeastFill = 0.7;
 constexpr int kSameThreshold = 6;
@@ -138,7 +138,7 @@ RegionGrower::Grown RegionGrower::Flood(cv::Point seed, int threshold) {
     open.pop_back();
     if (p.x == 0 || p.y == 0 || p.x == green_.cols - 1 || p.y == green_.rows - 1) return region;
     if (++region.area > most) return region;
-    region.red += redness_.at<std::uint8_t>(p) >= kLeastRedness;
+    region.red += redness_.at<std::uint8_t>(p) >= kLeastRegionRedness;
     top = std::min(top, p.y);
     bottom = std::max(bottom, p.y);
     rows[p.y] = {std::min(rows[p.y][0], p.x), std::max(rows[p.y][1], p.x)};

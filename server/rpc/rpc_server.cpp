@@ -19,6 +19,7 @@
 #include "server/rpc/scene_service.hpp"
 #include "server/rpc/session_service.hpp"
 #include "server/rpc/talk_service.hpp"
+#include "server/rpc/team_service.hpp"
 
 namespace saccade {
 namespace {
@@ -104,12 +105,14 @@ class RpcServer::Impl {
         pointer_service_(backend, pointers_, gate_),
         scene_service_(backend, gate_),
         calibration_service_(options.calibration, gate_),
-        talk_service_(backend, hub, gate_, options.limits.voice_packets) {
+        talk_service_(backend, hub, gate_, options.limits.voice_packets),
+        team_service_(options.team, gate_) {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
       pointers_.EndAccess(ids);
       hub_.End(ids, why);
       health_service_.End(ids, why);
+      team_service_.End(ids, why);
     });
   }
   ~Impl() {
@@ -154,6 +157,7 @@ class RpcServer::Impl {
     builder.RegisterService(&scene_service_);
     builder.RegisterService(&calibration_service_);
     builder.RegisterService(&talk_service_);
+    builder.RegisterService(&team_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
     listener_ = *std::move(listener);
@@ -166,6 +170,7 @@ class RpcServer::Impl {
     listener_->Stop();
     hub_.CloseAll(absl::UnavailableError("the server is shutting down"));
     health_service_.Stop();
+    team_service_.Stop();
     if (provider_ != nullptr) provider_->Stop();  // its calls are answered
     server_->Shutdown(std::chrono::system_clock::now() + grace);
     server_->Wait();
@@ -202,6 +207,7 @@ class RpcServer::Impl {
   SceneService scene_service_;
   CalibrationService calibration_service_;
   TalkService talk_service_;
+  TeamService team_service_;
   std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
   std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs
   std::unique_ptr<grpc::Server> server_;

@@ -18,6 +18,7 @@
 #include "saccade/v1/pointer.pb.h"
 #include "saccade/v1/scene.pb.h"
 #include "saccade/v1/session.pb.h"
+#include "saccade/v1/team.pb.h"
 #include "saccade/v1/wearer.pb.h"
 #include "tests/integration/identity/guarded_server.hpp"
 #include "tests/integration/identity/https_client.hpp"
@@ -62,6 +63,9 @@ const std::map<std::string, Least>& Promised() {
       {"TalkService/ListMessages", kViewer},
       {"TalkService/Say", kAnnotator},
       {"TalkService/Speak", kAnnotator},
+      {"TeamService/GetTeam", kViewer},
+      {"TeamService/Follow", kViewer},
+      {"TeamService/Tell", kPilot},
       {"AnnotationService/List", kViewer},
       {"AnnotationService/Create", kAnnotator},
       {"AnnotationService/Update", kAnnotator},
@@ -106,7 +110,7 @@ std::vector<const MethodDescriptor*> EveryMethod() {
         v1::ListAnnotationsRequest::descriptor(), v1::GetMapRequest::descriptor(),
         v1::GetGazeStateRequest::descriptor(), v1::PointRequest::descriptor(),
         v1::WearerHello::descriptor(), v1::ListSceneRequest::descriptor(),
-        v1::GetCalibrationRequest::descriptor()}) {
+        v1::GetCalibrationRequest::descriptor(), v1::GetTeamRequest::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

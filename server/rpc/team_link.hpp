@@ -1,0 +1,30 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "server/pipeline/team_port.hpp"
+
+namespace saccade {
+
+struct TeamLinkOptions {
+  std::string address;  // HOST:PORT of the other server
+  std::string token;    // where it needs one; empty: none
+};
+
+/// The way to another server (--team): follows it, and tells it what the own port tells. Plain
+/// gRPC. Where it is not there, or gone, the link tries again every second; what was told meanwhile
+/// is told then. Threads of its own; nobody waits for it.
+class TeamLink {
+ public:
+  /// `team` outlives the link.
+  TeamLink(TeamLinkOptions options, TeamPort& team);
+  /// Within a second, whatever the other does.
+  ~TeamLink();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace saccade
