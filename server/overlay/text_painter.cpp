@@ -13,7 +13,7 @@ constexpr std::size_t kMaxSprites = 256;
 constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr double kLineHeight = 1.28;  // of the size: marks above capitals have room
 constexpr double kAscent = 1.0;       // of the size, from the top of a line to its baseline
-const cv::Scalar kHalo{24, 22, 20};
+const cv::Scalar kTextHalo{24, 22, 20};
 const cv::Scalar kBoxFill{18, 17, 16};
 
 /// The letters' coverage and the emoji, to be coloured later.
@@ -94,7 +94,7 @@ Premultiplied Tint(const cv::Scalar& color, int alpha) {
 
 cv::Mat Compose(const Ink& ink, const TextStyle& style) {
   cv::Mat rim;
-  if (style.ground == TextGround::kHalo) {
+  if (style.ground == TextGround::kTextHalo) {
     const int r = std::max(1, style.layout.size_px / 8);
     cv::Mat all = ink.coverage.clone(), alpha;
     cv::extractChannel(ink.pictures, alpha, 3);
@@ -107,7 +107,7 @@ cv::Mat Compose(const Ink& ink, const TextStyle& style) {
   for (int y = 0; y < out.rows; ++y) {
     for (int x = 0; x < out.cols; ++x) {
       Premultiplied pixel = ground;
-      if (!rim.empty()) pixel = Tint(kHalo, rim.at<uchar>(y, x));
+      if (!rim.empty()) pixel = Tint(kTextHalo, rim.at<uchar>(y, x));
       pixel = Over(Tint(style.color, ink.coverage.at<uchar>(y, x)), pixel);
       if (ink.has_pictures) pixel = Over(ink.pictures.at<Premultiplied>(y, x), pixel);
       out.at<Premultiplied>(y, x) = pixel;

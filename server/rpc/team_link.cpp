@@ -17,7 +17,7 @@ namespace {
 
 constexpr auto kAnswer = std::chrono::seconds(3);  // of one Tell; then the other is gone
 constexpr auto kAgain = std::chrono::seconds(1);
-constexpr std::size_t kMaxWaiting = 256;
+constexpr std::size_t kMaxOnLink = 256;
 
 /// What waits to be told. Outlives the link where the port's thread still holds it.
 struct Outbox {
@@ -29,7 +29,7 @@ struct Outbox {
     {
       const std::lock_guard lock(mutex);
       for (const auto& part : InParts(whole)) news.push_back(part);
-      while (news.size() > kMaxWaiting) news.pop_front();
+      while (news.size() > kMaxOnLink) news.pop_front();
     }
     changed.notify_all();
   }

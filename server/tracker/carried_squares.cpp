@@ -22,7 +22,7 @@ constexpr std::size_t kMostRemembered = 100;  // frames
 constexpr double kForget_s = 1.0;             // of velocity, and of which reading is which
 /// Of where a corner is expected, tried in turn: a wide search meets the code's own edges.
 constexpr std::array<double, 3> kSpreads_px = {0.8, 1.5, 4.0};
-constexpr double kBorder_px = 4.0;
+constexpr double kCarriedBorder_px = 4.0;
 constexpr double kShortest_px = 12.0;  // side that is searched
 constexpr double kStray_px = 3.0;      // from where the detector saw it: what is followed is not it
 constexpr double kFacing = 0.17;       // cosine; see LandmarkTracker
@@ -172,7 +172,7 @@ void CarriedSquares::Search(const Frame& frame, Timestamp captured_ns,
   double longest = 0.0;
   for (int c = 0; c < 4; ++c) {
     const auto pixel = frame.camera->Project(camera_from_marker * points[c]);
-    if (!pixel || !frame.camera->InImage(*pixel, kBorder_px)) return;
+    if (!pixel || !frame.camera->InImage(*pixel, kCarriedBorder_px)) return;
     corners[c] = *pixel;
   }
   for (int c = 0; c < 4; ++c) {

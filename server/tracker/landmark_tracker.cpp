@@ -15,14 +15,15 @@ namespace saccade {
 namespace {
 
 constexpr int kEnoughSquares = 2;
-constexpr int kLostAfter = 15;         // frames with fewer
-constexpr double kGate_chi2 = 13.8;    // of a corner's innovation, two rows, one in a thousand
-constexpr double kFacing = 0.17;       // cosine: a square seen more aslant has no lines to fit
-constexpr double kShortest_px = 14.0;  // side that is searched
-constexpr double kBorder_px = 4.0;
+constexpr int kLostAfter = 15;       // frames with fewer
+constexpr double kGate_chi2 = 13.8;  // of a corner's innovation, two rows, one in a thousand
+constexpr double kFacing = 0.17;     // cosine: a square seen more aslant has no lines to fit
+constexpr double kTrackerShortest_px = 14.0;  // side that is searched
+constexpr double kTrackerBorder_px = 4.0;
 constexpr double kCornerNoise_px = 0.05;  // beyond the fits: print and lens
-constexpr int kHiddenCorners = 3;         // behind known geometry: the square is not searched
-constexpr int kHiddenLines = 2;  // with no more sides than this something is before the square
+constexpr int kTrackerHiddenCorners = 3;  // behind known geometry: the square is not searched
+constexpr int kTrackerHiddenLines =
+    2;  // with no more sides than this something is before the square
 constexpr double kFirstPosition_m = 0.02, kFirstAngle_rad = 0.01;  // beyond what the detector says
 
 }  // namespace
@@ -147,13 +148,13 @@ void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
   if (at.z() < kFacing * at.norm()) return;  // from behind, or too much aslant
   std::array<bool, 4> hidden{};
   if (sight_) hidden = sight_->Hides(filter_.WorldFromCamera().translation, points_[k]);
-  if (std::ranges::count(hidden, true) >= kHiddenCorners) return;
+  if (std::ranges::count(hidden, true) >= kTrackerHiddenCorners) return;
   SquareGuess guess;
   std::array<PredictedPixel, 4> predicted;
   double longest = 0.0;
   for (int c = 0; c < 4; ++c) {
     const auto pixel = filter_.Predicted(camera, points_[k][c]);
-    if (!pixel || !camera.InImage(pixel->at.pixel, kBorder_px)) return;
+    if (!pixel || !camera.InImage(pixel->at.pixel, kTrackerBorder_px)) return;
     predicted[c] = *pixel;
     guess.corners[c] = pixel->at.pixel;
     guess.covariances[c] = pixel->covariance;
@@ -162,13 +163,13 @@ void LandmarkTracker::SearchOne(const Frame& frame, std::size_t k) {
     corners_[4 * k + c].pixel = guess.corners[c];
     longest = std::max(longest, (guess.corners[c] - guess.corners[(c + 1) % 4]).norm());
   }
-  if (longest < kShortest_px) return;
+  if (longest < kTrackerShortest_px) return;
   const SquareSearch search = SearchSquareTwice(frame.grey, camera, guess);
   for (const Eigen::Matrix2d& spread : guess.covariances) {
     searched_px2_ += M_PI * 9.0 * std::sqrt(std::max(0.0, spread.determinant()));
   }
   // Something stands before it, which is no failure of the square's.
-  if (search.lines <= kHiddenLines) return;
+  if (search.lines <= kTrackerHiddenLines) return;
   const CornerLook look = LookAtCorners(frame.grey, guess, search, border_shares_[k]);
   int agreeing = 0;
   for (int c = 0; c < 4; ++c) {

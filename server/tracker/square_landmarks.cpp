@@ -12,10 +12,10 @@
 namespace saccade {
 namespace {
 
-constexpr std::size_t kMostViews = 40;   // of a square; beyond, every second one is forgotten
-constexpr std::size_t kMostPoses = 400;  // frames
-constexpr int kLookEvery = 5;            // frames, when nothing is missing
-constexpr double kFacing = 0.17;         // cosine; see LandmarkTracker
+constexpr std::size_t kMostViews = 40;    // of a square; beyond, every second one is forgotten
+constexpr std::size_t kMostPoses = 400;   // frames
+constexpr int kLookEvery = 5;             // frames, when nothing is missing
+constexpr double kLandmarkFacing = 0.17;  // cosine; see LandmarkTracker
 constexpr double kShortest_px = 14.0;
 constexpr double kBorder_px = 4.0;
 constexpr int kHiddenCorners = 3;   // behind known geometry: the square is not searched
@@ -142,7 +142,7 @@ void SquareLandmarks::SearchOne(const Frame& frame, const Rigid3& pose, const Ma
   states.fill(FeatureState::kNotAttempted);
   const auto& [world_from_square, corners, border_share, marker] = sought;
   const Eigen::Vector3d at = (world_from_square.Inverse() * pose).translation;
-  if (at.z() < kFacing * at.norm()) return;
+  if (at.z() < kLandmarkFacing * at.norm()) return;
   std::array<Eigen::Vector3d, 4> in_world = corners;
   for (Eigen::Vector3d& corner : in_world) corner = world_from_square * corner;
   std::array<bool, 4> hidden{};

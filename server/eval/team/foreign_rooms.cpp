@@ -12,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kCommon_m = 0.5, kCommon_rad = 0.5236;
-constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kRoomDegrees = 180.0 / std::numbers::pi;
 
 Similarity3 AnyMap(std::mt19937_64& random, bool metric) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -27,7 +27,7 @@ Similarity3 AnyMap(std::mt19937_64& random, bool metric) {
 void Compare(const MapJoin& join, const Similarity3& truth, WalkersResult& result) {
   const Similarity3& found = join.fit.own_from_other;
   const Similarity3 off = found * truth.Inverse();
-  result.off_deg = LogQuaternion(off.rotation).norm() * kDegrees;
+  result.off_deg = LogQuaternion(off.rotation).norm() * kRoomDegrees;
   Eigen::Matrix<double, 7, 1> error;
   error << off.translation, LogQuaternion(off.rotation), std::log(off.scale);
   const int n = join.metric ? 6 : 7;

@@ -9,14 +9,14 @@
 namespace saccade {
 namespace {
 
-constexpr double kBorder_px = 20.0;
+constexpr double kKeyframeBorder_px = 20.0;
 constexpr std::size_t kPartners = 4;  // views that a new one is triangulated with
 constexpr double kBaseline = 0.05;    // of the distance, at least
 constexpr double kMostTurned_rad = 0.6;
 constexpr double kNear = 0.3, kFar = 3.0;  // of the distance: ranges of corners
 constexpr double kMisfit_px = 3.0;
 constexpr double kMovedShare = 0.008, kMoved_rad = 0.006;  // worth being told
-constexpr double kMoreKnown = 1.2;
+constexpr double kMoreOfKeyframe = 1.2;
 constexpr std::uint32_t kMatured = 5;  // frames in which a feature was measured
 
 struct Usable {
@@ -30,7 +30,8 @@ std::vector<Usable> UsableIn(const Frame& frame, const MapSnapshot& snapshot) {
   std::vector<Usable> usable;
   for (const FeatureSnapshot& feature : snapshot.features) {
     if (feature.state != FeatureState::kMeasured || !feature.depth_known || !feature.pixel ||
-        feature.matched_count < kMatured || !frame.camera->InImage(*feature.pixel, kBorder_px)) {
+        feature.matched_count < kMatured ||
+        !frame.camera->InImage(*feature.pixel, kKeyframeBorder_px)) {
       continue;
     }
     usable.push_back({feature.id, *feature.pixel,
@@ -211,7 +212,7 @@ std::vector<TeamKeyframe> KeyframeMaker::Add(const Frame& frame, const MapSnapsh
     if ((view.world_from_camera.translation - view.told_pose.translation).norm() >
             kMovedShare * view.distance ||
         RotationAngle(view.world_from_camera, view.told_pose) > kMoved_rad ||
-        static_cast<double>(known) > kMoreKnown * view.told_known + 5) {
+        static_cast<double>(known) > kMoreOfKeyframe * view.told_known + 5) {
       Tell(view, snapshot, told);
     }
   }
