@@ -343,7 +343,8 @@ TEST_F(WearerSocketTest, ThePhoneHearsWhatBecameOfEachPicture) {
   ASSERT_TRUE(frame.ok() && frame->has_value());
   auto snapshot = std::make_shared<MapSnapshot>();
   snapshot->frame_id = (*frame)->id;
-  TrackedEvent event{snapshot, nullptr, nullptr, {}};
+  TrackedEvent event;
+  event.snapshot = snapshot;
   event.stages.tracked_ns = MonotonicNow();
   entrance_->OnTracked(event);
   const auto tracked = client.Await(Down::kTracked);
