@@ -41,9 +41,9 @@ std::string Table(const Json& report) {
       if (!one.contains(when) || one[when]["error"].is_null()) continue;
       const Json& error = one[when]["error"];
       absl::StrAppend(
-          &text, absl::StrFormat("; %s: off %.1f cm %.2f deg, rms %.1f cm", when,
+          &text, absl::StrFormat("; %s: off %.1f cm %.2f deg, at the seam %.1f cm", when,
                                  100 * error["off_m"].get<double>(), error["off_deg"].get<double>(),
-                                 100 * error["rms_m"].get<double>()));
+                                 100 * error["seam_m"].get<double>()));
     }
     absl::StrAppend(&text, "\n");
   }

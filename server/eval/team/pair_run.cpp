@@ -83,8 +83,11 @@ std::optional<double> CommonView(const Running& a, const Running& b) {
 
 Json ErrorJson(const std::optional<MergeError>& error) {
   if (!error) return nullptr;
-  return {{"off_m", error->off_m},     {"off_deg", error->off_deg}, {"rms_m", error->rms_m},
-          {"rms_deg", error->rms_deg}, {"sigma_m", error->sigma_m}, {"poses", error->poses}};
+  return {{"off_m", error->off_m},          {"off_deg", error->off_deg},
+          {"rms_m", error->rms_m},          {"rms_deg", error->rms_deg},
+          {"sigma_m", error->sigma_m},      {"poses", error->poses},
+          {"seam_m", error->seam_m},        {"seam_deg", error->seam_deg},
+          {"seam_poses", error->seam_poses}};
 }
 
 /// `pairs`: of own and other; the map of the wider way carries.
@@ -106,6 +109,8 @@ Json JoinJson(const MapJoin& join, const std::vector<PosePair>& own,
           {"disagreeing", join.disagreeing},
           {"views_tested", join.views_tested},
           {"views_contradicting", join.views_contradicting},
+          {"cells_tested", join.cells},
+          {"cells_empty", join.empty_cells},
           {"points", join.fit.points},
           {"rms_px", join.fit.rms_px},
           {"error", ErrorJson(error)}};

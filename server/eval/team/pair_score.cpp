@@ -29,6 +29,44 @@ Similarity3 AlignPoses(const std::vector<PosePair>& pairs) {
   return aligned;
 }
 
+namespace {
+
+constexpr double kSeam_m = 0.5, kSeam_rad = 0.5236;
+
+/// The pose that was taken from nearest, by truth; null: none from near.
+const PosePair* Nearest(const std::vector<PosePair>& pairs, const Rigid3& truth) {
+  const PosePair* nearest = nullptr;
+  double least = kSeam_m + kSeam_rad;
+  for (const PosePair& pair : pairs) {
+    const double apart_m = (pair.truth.translation - truth.translation).norm();
+    const double apart_rad = RotationAngle(pair.truth, truth);
+    if (apart_m > kSeam_m || apart_rad > kSeam_rad || apart_m + apart_rad > least) continue;
+    least = apart_m + apart_rad;
+    nearest = &pair;
+  }
+  return nearest;
+}
+
+void ScoreSeam(const std::vector<PosePair>& carrier, const std::vector<PosePair>& carried,
+               const Similarity3& carrier_from_carried, double metres, MergeError& error) {
+  double squared_m = 0, squared_rad = 0;
+  for (const PosePair& pair : carried) {
+    const PosePair* near = Nearest(carrier, pair.truth);
+    if (near == nullptr) continue;
+    const Rigid3 found = near->estimate.Inverse() * carrier_from_carried.Move(pair.estimate);
+    const Rigid3 truth = near->truth.Inverse() * pair.truth;
+    squared_m += (metres * found.translation - truth.translation).squaredNorm();
+    squared_rad += std::pow(RotationAngle(found, truth), 2);
+    ++error.seam_poses;
+  }
+  if (error.seam_poses == 0) return;
+  const double n = static_cast<double>(error.seam_poses);
+  error.seam_m = std::sqrt(squared_m / n);
+  error.seam_deg = std::sqrt(squared_rad / n) * 180.0 / std::numbers::pi;
+}
+
+}  // namespace
+
 std::optional<MergeError> ScoreMerge(const std::vector<PosePair>& carrier,
                                      const std::vector<PosePair>& carried,
                                      const Similarity3& carrier_from_carried,
@@ -59,6 +97,7 @@ std::optional<MergeError> ScoreMerge(const std::vector<PosePair>& carrier,
   Eigen::Matrix<double, 3, 7> by;
   by << Eigen::Matrix3d::Identity(), -Skew(middle), middle;
   error.sigma_m = truth_from_carrier.scale * std::sqrt((by * covariance * by.transpose()).trace());
+  ScoreSeam(carrier, carried, carrier_from_carried, truth_from_carrier.scale, error);
   return error;
 }
 

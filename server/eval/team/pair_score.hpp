@@ -19,6 +19,10 @@ struct MergeError {
   double off_m = 0, off_deg = 0;  // shared by all poses: mean of position and of rotation errors
   double rms_m = 0, rms_deg = 0;  // of single poses
   double sigma_m = 0;             // as the covariance has it, at the mean pose
+  /// Where the maps meet: of each of the other's poses against the nearest of the aligned map's,
+  /// within 0.5 m and 30 deg of it by truth. What either map is off elsewhere does not count.
+  std::size_t seam_poses = 0;
+  double seam_m = 0, seam_deg = 0;
 };
 
 /// `carrier`: of the map that is aligned; `carried`: of the other. Nothing with fewer than three

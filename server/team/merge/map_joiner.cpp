@@ -148,6 +148,8 @@ void MapJoiner::TestViews(MapJoin& join) const {
                     there_from_here.scale * view->distance, there, nullptr, kTested_px);
       if (presence.expected < kFewestExpected) continue;
       ++join.views_tested;
+      join.cells += presence.cells;
+      join.empty_cells += presence.empty_cells;
       join.views_contradicting += presence.share() < kContradicts ? 1 : 0;
     }
   }
@@ -191,8 +193,9 @@ bool MapJoiner::Judge(Timestamp now_ns) {
   join.places = static_cast<int>(best.size());
   join.disagreeing = static_cast<int>(places_.size() - best.size());
   TestViews(join);
-  if (join.views_contradicting >
-      (join_ ? options_.reluctance : 1.0) * options_.most_contradicting * join.views_tested) {
+  const double patience = join_ ? options_.reluctance : 1.0;
+  if (join.views_contradicting > patience * options_.most_contradicting * join.views_tested ||
+      join.empty_cells > patience * options_.most_empty * join.cells) {
     return give_up();
   }
   join.since_ns = join_ ? join_->since_ns : now_ns;

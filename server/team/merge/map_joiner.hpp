@@ -23,6 +23,7 @@ struct MapJoinerOptions {
   double moved_share = 0.05;  // of the distance, or
   double turned_rad = 0.1;    // between the pictures that agree: one view proves nothing
   double most_contradicting = 0.2;  // of views in which the other map should show
+  double most_empty = 0.3;          // of the cells of all those pictures, in which it should show
   /// What is once a join is given up where it would not be half as good as it had to be.
   double reluctance = 2.0;
 };
@@ -34,8 +35,9 @@ struct MapJoin {
   int places = 0;       // that agree, and
   int disagreeing = 0;  // of those kept
   int views_tested = 0, views_contradicting = 0;
-  Timestamp since_ns = 0;      // told_time_ns of the keyframe that made it one
-  std::uint64_t revision = 0;  // rises with each new estimate
+  int cells = 0, empty_cells = 0;  // of their pictures, as Presence has them
+  Timestamp since_ns = 0;          // told_time_ns of the keyframe that made it one
+  std::uint64_t revision = 0;      // rises with each new estimate
 };
 
 /// Finds out whether and how two maps show one place, from their keyframes alone.
