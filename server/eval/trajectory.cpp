@@ -16,7 +16,7 @@ namespace saccade {
 namespace {
 
 constexpr std::size_t kMaxLine = 4096;
-constexpr std::size_t kMaxBytes = std::size_t{256} << 20;
+constexpr std::size_t kMaxTrajectoryBytes = std::size_t{256} << 20;
 
 absl::StatusOr<StampedPose> ParseLine(absl::string_view line) {
   const std::vector<absl::string_view> fields =
@@ -46,7 +46,8 @@ absl::StatusOr<StampedPose> ParseLine(absl::string_view line) {
 }  // namespace
 
 absl::StatusOr<Trajectory> LoadTrajectory(const std::filesystem::path& file) {
-  const absl::StatusOr<std::string> whole = ReadRegularFile(file, kMaxBytes, "a trajectory");
+  const absl::StatusOr<std::string> whole =
+      ReadRegularFile(file, kMaxTrajectoryBytes, "a trajectory");
   if (absl::IsNotFound(whole.status())) {
     return absl::NotFoundError(
         absl::StrCat(file.string(), ": cannot be opened; give a file in TUM format"));

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 constexpr std::uint32_t kOak = 0xb98a55ff, kWalnut = 0x7a5436ff, kCushion = 0x3f6f9fff,
                         kScreen = 0xd8d2c2ff, kFrame = 0x555f66ff, kGridColor = 0x2fd0e0ff,
-                        kRouteColor = 0x22c05aff, kRed = 0xe0261eff;
+                        kRouteColor = 0x22c05aff, kArrowColor = 0xe0261eff;
 constexpr std::uint32_t kWires[] = {0xf2b21bff, 0x3a7bd5ff, 0xe0261eff};
 
 PlacedMesh Placed(TriangleMesh mesh, const Vector3d& at, double turn_rad, SceneMaterial material) {
@@ -209,16 +209,15 @@ std::vector<PlacedMesh> EscapeRoute() {
       {0.7, 0, -0.5}, {0.95, 0, -1.25}, {2.6, 0, -1.25}, {3.28, 0, -1.05}, {3.3, 0, -0.35}};
   TriangleMesh sign;
   AddBox({0, 0, 0}, {0.5, 0.2, 0.02}, kRouteColor, sign);
-  Append(ArrowMesh({0, -0.18, -0.02}, {0, -0.02, -0.02}, 0.018, 0xf4f8f4ff), Rigid3(), 1.0,
-         sign);
+  Append(ArrowMesh({0, -0.18, -0.02}, {0, -0.02, -0.02}, 0.018, 0xf4f8f4ff), Rigid3(), 1.0, sign);
   return {Placed(RouteMesh(way, 0.26, kRouteColor), Vector3d::Zero(), 0, SceneMaterial::kGuide),
           Placed(sign, {3.3, -2.14, -0.06}, 0, SceneMaterial::kGuide)};
 }
 
 std::vector<PlacedMesh> RedArrow() {
   const Vector3d tip = FigureRoom::kAlarm + Vector3d(0.05, -0.04, -0.07);
-  return {Placed(ArrowMesh(tip + Vector3d(0.52, -0.40, -0.30), tip, 0.026, kRed), Vector3d::Zero(),
-                 0, SceneMaterial::kGuide)};
+  return {Placed(ArrowMesh(tip + Vector3d(0.52, -0.40, -0.30), tip, 0.026, kArrowColor),
+                 Vector3d::Zero(), 0, SceneMaterial::kGuide)};
 }
 
 std::vector<PlacedMesh> HoseInCabinet() {

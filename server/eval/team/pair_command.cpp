@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string Table(const Json& report) {
+std::string PairTable(const Json& report) {
   std::string text;
   for (const Json& one : report["wearers"]) {
     absl::StrAppend(
@@ -102,7 +102,7 @@ absl::Status PairCommand(const TeamArguments& arguments) {
       !done.ok()) {
     return done;
   }
-  std::cout << (arguments.json ? report->dump(2) + "\n" : Table(*report));
+  std::cout << (arguments.json ? report->dump(2) + "\n" : PairTable(*report));
   return absl::OkStatus();
 }
 

@@ -159,7 +159,7 @@ absl::StatusOr<Json> RunCameras(const TeamArguments& arguments, const TeamSettin
   return report;
 }
 
-std::string Table(const Json& report) {
+std::string TeamTable(const Json& report) {
   const bool robots = report["kind"] == "robots";
   std::string text;
   for (const Json& one : report[robots ? "robots" : "cameras"]) {
@@ -213,7 +213,7 @@ absl::Status TeamCommand(const TeamArguments& arguments) {
       !done.ok()) {
     return done;
   }
-  std::cout << (arguments.json ? report->dump(2) + "\n" : Table(*report));
+  std::cout << (arguments.json ? report->dump(2) + "\n" : TeamTable(*report));
   return absl::OkStatus();
 }
 
