@@ -97,6 +97,7 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
                {"hidden", state.hidden.size()},
                {"lasers", told.pointers.lasers()},
                {"editing", state.editor.has_value() || state.dialog.has_value()},
+               {"writing", state.talk.writing},
                {"said", told.chat.messages().size()},
                {"paused", told.pause.has_value()},
                {"voice", desk.voice().Words()},

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <tuple>
 
 #include "shared/io/log.hpp"
@@ -46,7 +47,7 @@ std::string String(FcPattern* pattern, const char* name) {
 
 struct Candidate {
   FontFile font;
-  std::tuple<std::size_t, bool, bool, bool, bool, std::string, int> order;
+  std::tuple<std::size_t, bool, bool, bool, int, std::string, int> order;
 };
 
 std::optional<Candidate> ReadPattern(FcPattern* pattern, FontWeight weight) {
@@ -68,8 +69,9 @@ std::optional<Candidate> ReadPattern(FcPattern* pattern, FontWeight weight) {
   const bool slanted = Int(pattern, FC_SLANT, FC_SLANT_ROMAN) != FC_SLANT_ROMAN;
   const bool narrow = Int(pattern, FC_WIDTH, FC_WIDTH_NORMAL) != FC_WIDTH_NORMAL;
   const bool serif = !absl::StrContains(family, "Sans") && rank == kPreferred.size();
-  const bool other_weight = font.bold != (weight == FontWeight::kBold);
-  auto order = std::tuple(rank, slanted, serif, narrow, other_weight, font.path, font.index);
+  const int weighs = Int(pattern, FC_WEIGHT, FC_WEIGHT_REGULAR);
+  const int off = weight == FontWeight::kBold ? !font.bold : std::abs(weighs - FC_WEIGHT_REGULAR);
+  auto order = std::tuple(rank, slanted, serif, narrow, off, font.path, font.index);
   return Candidate{std::move(font), std::move(order)};
 }
 

@@ -127,8 +127,9 @@ async function page(context, { findObject, marked, idsOf }) {
     kept?.shape === 'picture' && more > 200,
     `${kept?.shape}, ${more} red pixels more`,
   );
-  screen.press('v', 'Escape');
+  screen.press('v');
   await still(context, false);
+  screen.press('Escape');
 }
 
 /** Text beyond Latin: the fonts are found while it runs. */
@@ -143,9 +144,11 @@ async function scripts(context) {
   context.ask('annotate', ...where, '--shape', 'note', '--text', text);
   await desktop.until('the note', ({ marks }) => marks.some((mark) => mark.text === text));
   screen.press('9');
+  await desktop.until('the message field', ({ writing }) => writing);
   await sleep(1500);
   context.shot('scripts');
   screen.press('Escape');
+  await desktop.until('keys are tools again', ({ writing }) => !writing);
   check('a note in six scripts is shown, and the window goes on', true, text);
 }
 

@@ -87,6 +87,13 @@ TEST_F(Letters, ArabicIsJoinedAndSeenFromTheRight) {
   EXPECT_FALSE(LookAlike(whole.front(), first.front()));
 }
 
+TEST_F(Letters, LatinBesideOtherScriptsIsAsHeavyAsElsewhere) {
+  const FontCatalogue& regular = FontCatalogue::System(FontWeight::kRegular);
+  const auto font = regular.FontFor(U"n", false);
+  ASSERT_TRUE(font);
+  EXPECT_THAT(regular.fonts()[*font].path, HasSubstr("/DejaVuSans.ttf")) << "not its light one";
+}
+
 TEST_F(Letters, UntilTheFontHasItItIsABlankNotAQuestionMark) {
   Make();
   EXPECT_EQ(Types().Set("油位"), " ");
