@@ -16,6 +16,7 @@
 #include "server/capture/frame_decoder.hpp"
 #include "server/capture/gap.hpp"
 #include "server/capture/image_list.hpp"
+#include "server/capture/imu_file.hpp"
 #include "server/capture/picture_size.hpp"
 #include "server/capture/target_file.hpp"
 #include "server/capture/uri_query.hpp"
@@ -185,7 +186,7 @@ class RealtimeSource final : public DatasetSource {
   Timestamp origin_ns_ = 0;  // steady clock minus capture clock
 };
 
-/// Target and start pose, where the folder has them.
+/// Target, start pose and inertial samples, where the folder has them.
 absl::Status ReadFacts(const std::filesystem::path& folder, std::uint64_t first_frame,
                        SourceInfo* info) {
   if (MayExist(folder / "target.yaml")) {
@@ -200,6 +201,9 @@ absl::Status ReadFacts(const std::filesystem::path& folder, std::uint64_t first_
     if (!start.ok()) return start.status();
     if (first_frame == 0) info->start = *start;
   }
+  absl::StatusOr<std::shared_ptr<ImuFeed>> imu = LoadImu(folder);
+  if (!imu.ok()) return imu.status();
+  info->imu = *std::move(imu);
   return absl::OkStatus();
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/capture/frame.hpp"
+#include "server/capture/imu_feed.hpp"
 #include "server/capture/target.hpp"
 #include "server/mount/mount_model.hpp"
 
@@ -25,6 +26,7 @@ struct SourceInfo {
   std::optional<std::uint64_t> frame_count;
   std::shared_ptr<const MountModel> mount;  // what turns the camera; null: fixed to the wearer
   bool lens_assumed = false;                // nobody measured it: it is learnt while it is tracked
+  std::shared_ptr<ImuFeed> imu;             // a unit that is fixed to the camera; null: none
 };
 
 /// Where frames come from. One thread calls Next(); the source paces itself only if it is live or

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "server/filter/inertial_motion.hpp"
+
 namespace saccade {
 
 FilterState::FilterState(const FilterOptions& options)
@@ -49,9 +51,16 @@ void FilterState::ResetCamera(const CameraMotion& camera, const Matrix12d& covar
   Island& island = IslandAt(IslandOf(robot.block));
   island.checkpoint.reset();
   robot.head = HeadRate();
+  const ImuState unit = robot.motion.imu;  // elsewhere it is the same unit
   robot.motion = camera;
+  if (robot.model == &InertialMotion()) {
+    robot.head.reset();
+    robot.motion.imu = unit;
+  }
   robot.first_pose = camera.world_from_camera;
-  island.p.ReplaceBlock(At(robot.block), robot.model->InState(covariance));
+  const int common = robot.model->common();
+  island.p.ReplaceBlock(At(robot.block),
+                        robot.model->InState(covariance).topLeftCorner(common, common));
 }
 
 void FilterState::RemoveRobot(RobotId id) {
@@ -78,10 +87,14 @@ bool FilterState::HasRobot(RobotId id) const {
 
 Matrix12d FilterState::CameraCovariance(RobotId id) const {
   const Robot& robot = Of(id);
-  const int at = At(robot.block), size = robot.model->dim();
+  const int at = At(robot.block), size = robot.model->common();
+  const Covariance& p = IslandAt(IslandOf(robot.block)).p;
   Matrix12d covariance = Matrix12d::Zero();
-  covariance.topLeftCorner(size, size) =
-      IslandAt(IslandOf(robot.block)).p.Block(at, at, size, size);
+  covariance.topLeftCorner(size, size) = p.Block(at, at, size, size);
+  if (robot.model == &InertialMotion()) {
+    const int bias = at + InertialErrors::kGyroBias;  // what is left of the turn rate's errors
+    covariance.bottomRightCorner<3, 3>() = p.Block(bias, bias, 3, 3);
+  }
   return covariance;
 }
 

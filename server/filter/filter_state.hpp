@@ -13,6 +13,7 @@
 #include "server/filter/covariance.hpp"
 #include "server/filter/depth_particles.hpp"
 #include "server/filter/filter_types.hpp"
+#include "server/filter/inertial_start.hpp"
 #include "server/filter/journal.hpp"
 #include "server/filter/parallax.hpp"
 #include "server/filter/point_parametrisation.hpp"
@@ -84,6 +85,17 @@ class FilterState {
   /// wearer's wherever the head is known. Other robots stay where they are.
   void Predict(double dt, const MotionNoise& noise, const HeadMotion* head = nullptr,
                RobotId robot = kFirstRobot);
+  /// The robot's motion is measured by an inertial unit from here on. `solution` is of the present
+  /// pose, in this world, which has become metric by it (MoveWorld): that the unit of length is
+  /// known to scale_sigma only makes everything uncertain as it is away from `origin`. Ends the
+  /// checkpoint.
+  void StartInertial(const InertialSolution& solution, const Eigen::Vector3d& origin,
+                     RobotId robot = kFirstRobot);
+  bool inertial(RobotId robot = kFirstRobot) const;
+  /// As Predict(), by samples where they cover the step (true), by M1 with `noise` where not.
+  bool PredictInertial(const ImuStep& step, const MotionNoise& noise, RobotId robot = kFirstRobot);
+  /// Of the errors of inertial(), as InertialErrors.
+  Eigen::MatrixXd InertialCovariance(RobotId robot = kFirstRobot) const;
   /// Widens what is known of the camera's pose and velocities by P += `extra`.
   void Inflate(const Matrix12d& extra, RobotId robot = kFirstRobot);
 
@@ -252,6 +264,9 @@ class FilterState {
   void Follow(const MotionModel::Step& step, Robot& robot);
   static HeadRate RateOf(const HeadMotion& head, double dt, const Robot& robot);
   void ChangeVelocities(double sign, Robot& robot);
+  // Inertial: inertial.cpp.
+  /// What everything in an island errs by where the world's unit is wrong, by its logarithm.
+  Eigen::VectorXd ScaleDirection(int island, const Eigen::Vector3d& origin) const;
 
   // Where things are seen: prediction.cpp.
   PointFromClone Point(const Feature& feature, bool first) const;

@@ -45,6 +45,7 @@ void FilterState::MoveWorld(const Similarity3& world_from_before, RobotId id) {
     island.p.TransformBlock(At(robot.block), robot.model->InMovedWorld(turn));
     robot.motion.world_from_camera = world_from_before.Move(robot.motion.world_from_camera);
     robot.motion.velocity_m_s = turn * robot.motion.velocity_m_s;
+    robot.motion.imu.gravity_m_s2 = world_from_before.rotation * robot.motion.imu.gravity_m_s2;
     robot.first_pose = world_from_before.Move(robot.first_pose);
     if (robot.head) {
       robot.head->rate.head<3>() = turn * robot.head->rate.head<3>();

@@ -30,6 +30,8 @@ void FilterState::ChangeVelocities(double sign, Robot& robot) {
 CameraMotion FilterState::WholeMotion(RobotId id) const {
   const Robot& robot = Of(id);
   CameraMotion whole = robot.motion;
+  whole.velocity_m_s -= whole.world_from_camera.rotation *
+                        whole.angular_velocity_rad_s.cross(whole.imu.camera_from_imu.translation);
   if (robot.head) {
     whole.velocity_m_s += robot.head->rate.head<3>();
     whole.angular_velocity_rad_s += robot.head->rate.tail<3>();

@@ -9,12 +9,22 @@ namespace saccade {
 using Vector12d = Eigen::Matrix<double, 12, 1>;
 using Matrix12d = Eigen::Matrix<double, 12, 12>;
 
+/// What an inertial unit that is fixed to a camera needs to be told (inertial_motion.hpp).
+struct ImuState {
+  Eigen::Vector3d gyro_bias_rad_s = Eigen::Vector3d::Zero();          // in the unit
+  Eigen::Vector3d accelerometer_bias_m_s2 = Eigen::Vector3d::Zero();  // in the unit
+  Eigen::Vector3d gravity_m_s2 = Eigen::Vector3d::Zero();             // in world, downwards
+  double offset_s = 0.0;  // its clock is so much ahead: what it stamps t happened at t - offset_s
+  Rigid3 camera_from_imu;
+};
+
 /// What the filter knows of the moving camera: 13 numbers, 12 error dimensions in the order
 /// [position (world), rotation (local, on the right), velocity (world), angular velocity (camera)].
 struct CameraMotion {
   Rigid3 world_from_camera;
-  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();            // in world
+  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();  // in world; of the unit, where one is
   Eigen::Vector3d angular_velocity_rad_s = Eigen::Vector3d::Zero();  // in camera
+  ImuState imu;
 };
 
 /// `camera` [+] `error`, and its inverse `to` [-] `from` (slam-spec section 1).
@@ -53,7 +63,7 @@ MotionJacobians LineariseHead(const CameraMotion& camera, const HeadMotion& head
 /// Errors begin with the pose's six [position (world), rotation (local)].
 class MotionModel {
  public:
-  static constexpr int kMostErrors = 12;
+  static constexpr int kMostErrors = 19;
   using Errors = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostErrors, 1>;
   using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostErrors, kMostErrors>;
 
@@ -69,8 +79,14 @@ class MotionModel {
   int dim() const { return dim_; }
   /// Where the errors of [velocity (world), angular velocity (camera)] are; below 0: it has none.
   int velocities() const { return velocities_; }
+  /// How many of CameraMotion's errors its own begin with, in the same order.
+  int common() const { return common_; }
   /// What of a covariance of all errors of CameraMotion is in the state.
-  Square InState(const Matrix12d& covariance) const { return covariance.topLeftCorner(dim_, dim_); }
+  Square InState(const Matrix12d& covariance) const {
+    Square in_state = Square::Zero(dim_, dim_);
+    in_state.topLeftCorner(common_, common_) = covariance.topLeftCorner(common_, common_);
+    return in_state;
+  }
 
   /// `motion` [+] `error`, and its inverse `to` [-] `from`.
   virtual CameraMotion Plus(const CameraMotion& motion, const Errors& error) const = 0;
@@ -91,10 +107,12 @@ class MotionModel {
   virtual Square InMovedWorld(const Eigen::Matrix3d& turn) const = 0;
 
  protected:
-  MotionModel(int dim, int velocities) : dim_(dim), velocities_(velocities) {}
+  MotionModel(int dim, int velocities) : MotionModel(dim, velocities, dim) {}
+  MotionModel(int dim, int velocities, int common)
+      : dim_(dim), velocities_(velocities), common_(common) {}
 
  private:
-  const int dim_, velocities_;
+  const int dim_, velocities_, common_;
 };
 
 /// A camera that stands still: 6 errors, and no prediction adds to them.

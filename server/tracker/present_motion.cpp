@@ -18,6 +18,10 @@ double ShareOfStep(const Eigen::Matrix3d& variance, double acceleration, double 
 
 CameraMotion PresentMotion(const FilterState& filter, const Rigid3& pose, const MotionStep& step) {
   CameraMotion motion = filter.WholeMotion();
+  if (filter.inertial()) {  // a unit measures it better
+    motion.world_from_camera = pose;
+    return motion;
+  }
   if (step.dt < kShortest_s) return motion;
   const Rigid3 expected = motion.world_from_camera;
   const Matrix12d covariance = filter.CameraCovariance();

@@ -73,6 +73,11 @@ void StatusMonitor::Suspend() {
   }
 }
 
+void StatusMonitor::Coast() {
+  refused_ = false;
+  if (status_ == TrackingStatus::kTracking) status_ = TrackingStatus::kCoasting;
+}
+
 void StatusMonitor::Record(int attempted, int accepted, bool settled) {
   suspended_in_row_ = 0;
   refused_ = false;

@@ -24,6 +24,8 @@ class StatusMonitor {
   void Suspend();
   /// Nobody knows where the camera is: a gap in time, say.
   void Lose();
+  /// A frame that showed too little, of a camera that something else carries.
+  void Coast();
   /// Tracking was lost, and now the camera may be found again: three frames must confirm it.
   void BeginRelocalisation();
 

@@ -73,6 +73,10 @@ Tracker::Tracker(const SourceInfo& source, const TrackerOptions& options,
   if (source.lens_assumed && options.learn_lens) {
     learner_ = std::make_unique<LensLearner>(options, source.camera);
   }
+  // Where joints turn the camera, nobody knows on which side of them the unit is.
+  if (source.imu != nullptr && options.inertial && !source.mount) {
+    guide_ = std::make_unique<InertialGuide>(source.imu, InertialGuideOptions());
+  }
 }
 
 void Tracker::Reset() {
@@ -92,6 +96,8 @@ void Tracker::Reset() {
   before_relocalisation_.reset();
   started_ = metric_ = held_ = has_frame_ = false;
   if (squares_) squares_->Reset();
+  if (guide_) guide_->Reset();
+  blind_s_ = 0.0;
   in_squares_world_ = resuming_ = false;
   resuming_since_ns_.reset();
   waited_for_squares_ = 0;
@@ -129,10 +135,13 @@ std::shared_ptr<const MapSnapshot> Tracker::TrackSeen(const Frame& frame) {
   StopWatch total;
   times_ = StageTimes();
   const double dt = has_frame_ ? Seconds(frame.capture_time_ns - last_frame_.capture_time_ns) : 0.0;
-  const bool gap = has_frame_ && IsGap(last_frame_.capture_time_ns, frame.capture_time_ns);
+  const bool gap =
+      has_frame_ && IsGap(last_frame_.capture_time_ns, frame.capture_time_ns) && !Bridges(frame);
   if (has_frame_ && dt <= 0.0 && !gap) return Publish(frame, times_);
   // One picture again is no measurement: what moves meanwhile is a gap when the next one comes.
-  if (has_frame_ && !gap && front_end_->Repeats(frame)) {
+  const bool repeats = has_frame_ && !gap && front_end_->Repeats(frame);
+  const bool coasts = repeats && Bridges(frame);
+  if (repeats && !coasts) {
     if (started_ && ++repeated_ > kRepeats) monitor_.Suspend();
     return Publish(frame, times_);
   }
@@ -142,6 +151,10 @@ std::shared_ptr<const MapSnapshot> Tracker::TrackSeen(const Frame& frame) {
   if (gap) ResumeAfterGap();
   previous_mount_ = has_frame_ ? last_frame_.mount : std::nullopt;
   last_frame_ = frame;
+  if (coasts) {
+    Coast(dt);
+    return Publish(frame, times_);
+  }
   if (last_frame_.mount && !ToVector(*last_frame_.mount).allFinite()) last_frame_.mount.reset();
   has_frame_ = true;
   if (squares_) {
@@ -169,7 +182,7 @@ std::shared_ptr<const MapSnapshot> Tracker::TrackSeen(const Frame& frame) {
 }
 
 bool Tracker::Settled() const {
-  if (!held_ || WaitsForMetre()) return false;
+  if (!held_ || WaitsForMetre() || WaitsForUnit()) return false;
   return options_.start || metric_ || monitor_.status() != TrackingStatus::kInitialising ||
          HasSettled(matches_, filter_, frames_, SettlingOptions());
 }
@@ -186,7 +199,7 @@ void Tracker::PredictAndSearch(const CameraModel& camera, double dt) {
   }
   const CameraMotion before = filter_.camera();
   const int accepted_before = matches_.accepted;
-  filter_.Predict(dt, noise, head ? &*head : nullptr);
+  if (!PredictByUnit(dt, noise)) filter_.Predict(dt, noise, head ? &*head : nullptr);
   suspended_ = suspension_.Suspends(head ? &*head : nullptr, dt);
   if (!suspended_) Wake(camera);
   times_.predict_ms = watch.Lap_ms();
@@ -196,7 +209,7 @@ void Tracker::PredictAndSearch(const CameraModel& camera, double dt) {
     return;
   }
   matches_ = matcher_.Match(*front_end_, camera, filter_, map_.in_use(), {dt, noise}, random_);
-  if (IsWorthWidening(matches_, accepted_before, options_.coasting_below)) {
+  if (!Carried() && IsWorthWidening(matches_, accepted_before, options_.coasting_below)) {
     WidenAfterSurprise(before, dt, agile, SurpriseOptions(), filter_);
     const double searched_px2 = matches_.searched_px2;
     matches_ = matcher_.Match(*front_end_, camera, filter_, map_.in_use(), {dt, noise}, random_);
@@ -210,7 +223,7 @@ void Tracker::Correct(const CameraModel& camera) {
   StopWatch watch;
   nis_ = 0.0;
   std::vector<Observation> observations;
-  if (matches_.accepted >= kFewestToUpdate) {
+  if (matches_.accepted >= (Carried() ? options_.coasting_below : kFewestToUpdate)) {
     for (const LandmarkMatch& match : matches_.in_view) {
       if (!match.accepted()) continue;
       Observation observation;
@@ -247,8 +260,10 @@ void Tracker::Follow(const Frame& frame, double dt) {
   StopWatch watch;
   const double waited_before_ms = times_.waited_ms;
   rate_.Record(matches_.attempted, matches_.accepted, MovedPx(*frame.camera, dt));
-  monitor_.Record(matches_.attempted + SquaresAttempted(), matches_.accepted + SquaresFound(),
-                  Settled());
+  if (!CoastsBlind(dt)) {
+    monitor_.Record(matches_.attempted + SquaresAttempted(), matches_.accepted + SquaresFound(),
+                    Settled());
+  }
   const bool confirmed = monitor_.status() == TrackingStatus::kTracking ||
                          monitor_.status() == TrackingStatus::kInitialising;
   if (monitor_.refused()) {
@@ -259,6 +274,7 @@ void Tracker::Follow(const Frame& frame, double dt) {
     Manage(frame);
     if (held_ && learner_) LearnLens(frame);
     if (squares_) ManageSquares(frame);
+    SeekUnit(frame);
   }
   times_.manage_ms = watch.Lap_ms() - (times_.waited_ms - waited_before_ms);
 }

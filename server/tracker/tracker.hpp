@@ -15,6 +15,7 @@
 #include "server/tracker/frame_matcher.hpp"
 #include "server/tracker/frame_tracker.hpp"
 #include "server/tracker/front_end.hpp"
+#include "server/tracker/inertial_guide.hpp"
 #include "server/tracker/lens_evidence.hpp"
 #include "server/tracker/lens_learner.hpp"
 #include "server/tracker/loop_closer.hpp"
@@ -168,6 +169,20 @@ class Tracker final : public FrameTracker {
   bool RecoverBySquares(const Frame& frame);
   /// The map becomes metric; `metre` in its units.
   void TakeMetre(double metre);
+  // An inertial unit (inertial.cpp).
+  /// It carries the camera from frame to frame: the map is in metres, gravity and biases are known.
+  bool Carried() const;
+  /// Whether it carries the camera to `frame` over a gap that would otherwise be a loss.
+  bool Bridges(const Frame& frame);
+  /// False: it does not carry the camera, nothing is done.
+  bool PredictByUnit(double dt, const MotionNoise& noise);
+  /// A frame that shows nothing new: the camera is where the unit says.
+  void Coast(double dt);
+  /// The same of a frame in which too little was found; false: it counts as any other.
+  bool CoastsBlind(double dt);
+  /// It is about to tell what a metre is: poses before would be in another unit.
+  bool WaitsForUnit() const;
+  void SeekUnit(const Frame& frame);
   int SquaresAttempted() const { return squares_ ? squares_->attempted() : 0; }
   int SquaresFound() const { return squares_ ? static_cast<int>(squares_->found().size()) : 0; }
   std::optional<double> MovedPx(const CameraModel& camera, double dt) const;
@@ -215,6 +230,8 @@ class Tracker final : public FrameTracker {
   double nis_ = 0.0;
   StageTimes times_;
   std::optional<Map::Checkpoint> before_relocalisation_;
+  std::unique_ptr<InertialGuide> guide_;  // null: no inertial unit, or none is wanted
+  double blind_s_ = 0.0;                  // since something was seen
   std::unique_ptr<SquareLandmarks> squares_;
   int waited_for_squares_ = 0;  // frames
   /// Of the first frame in which a stored map was looked for; it was not found yet.

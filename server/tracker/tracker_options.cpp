@@ -29,6 +29,7 @@ const OptionTable<TrackerOptions>& Table() {
        "of the wearer, where encoders tell what the head does"},
       {"worn_angular_acceleration_sigma_rad_s2", &O::worn_angular_acceleration_sigma_rad_s2, 1e-3,
        1e3, "of the wearer"},
+      {"inertial", &O::inertial, 0, 1, "use an inertial unit where the source has one"},
       {"fej", &O::fej, 0, 1, "Jacobians at first estimates always ..."},
       {"fej_updates", &O::fej_updates, 0, 1e9, "... or for so many updates of a map"},
       {"start", &O::start, 0, 1,

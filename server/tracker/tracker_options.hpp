@@ -28,6 +28,9 @@ struct TrackerOptions {
   double worn_angular_acceleration_sigma_rad_s2 = 2.0;  // a walking trunk
 
   // Filter.
+  /// Use a source's inertial unit: metres, gravity, and motion where nothing is seen. Off: on
+  /// `hall_imu` the metre is 5 % wrong (docs/measurements/2026-11-30-inertial.md).
+  bool inertial = false;
   bool fej = false;                 // Jacobians at first estimates (slam-spec 1) always...
   int fej_updates = 60;             // ...or for so many updates of a map
   bool range_only = false;          // ESID: bearings frozen at birth; false: SID
