@@ -16,7 +16,7 @@
 #include "server/rpc/team_link.hpp"
 #include "tests/integration/stream/patch_room.hpp"
 
-namespace saccade::testing {
+namespace saccade::testing::team_integration_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -198,4 +198,4 @@ TEST(Team, SaysWhatIsWrongWithWhatItIsTold) {
 }
 
 }  // namespace
-}  // namespace saccade::testing
+}  // namespace saccade::testing::team_integration_test

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace saccade::view {
+namespace saccade::view::key_queue_test {
 namespace {
 
 constexpr int kTab = 1, kA = 2;
@@ -71,4 +71,4 @@ TEST_F(Keys, TextAloneNeverWaits) {
 }
 
 }  // namespace
-}  // namespace saccade::view
+}  // namespace saccade::view::key_queue_test

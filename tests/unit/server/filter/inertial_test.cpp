@@ -3,7 +3,7 @@
 #include "server/filter/filter_state.hpp"
 #include "tests/unit/server/filter/simulated_unit.hpp"
 
-namespace saccade {
+namespace saccade::inertial_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -276,4 +276,4 @@ TEST(InertialFilter, ACameraThatIsFoundAgainKeepsItsBiases) {
 }
 
 }  // namespace
-}  // namespace saccade
+}  // namespace saccade::inertial_test
