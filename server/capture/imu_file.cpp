@@ -17,13 +17,13 @@ namespace saccade {
 namespace {
 
 constexpr std::size_t kMaxBytes = std::size_t{512} << 20;
-constexpr absl::string_view kForm = "write `NANOSECONDS,wx,wy,wz,ax,ay,az` in rad/s and m/s^2";
+constexpr absl::string_view kImuForm = "write `NANOSECONDS,wx,wy,wz,ax,ay,az` in rad/s and m/s^2";
 constexpr double kFastest_rad_s = 100.0, kHardest_m_s2 = 400.0;  // gyros end at 35, or 70
 constexpr double kLightest_m_s2 = 4.0, kHeaviest_m_s2 = 30.0;    // on average, standing or carried
 constexpr std::array kNames = {"wx", "wy", "wz", "ax", "ay", "az"};
 
 absl::Status At(const std::filesystem::path& file, int line, absl::string_view problem,
-                absl::string_view remedy = kForm) {
+                absl::string_view remedy = kImuForm) {
   return absl::InvalidArgumentError(
       absl::StrCat(file.string(), ":", line, ": ", problem, "; ", remedy));
 }
