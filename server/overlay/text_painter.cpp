@@ -94,7 +94,7 @@ Premultiplied Tint(const cv::Scalar& color, int alpha) {
 
 cv::Mat Compose(const Ink& ink, const TextStyle& style) {
   cv::Mat rim;
-  if (style.ground == TextGround::kTextHalo) {
+  if (style.ground == TextGround::kHalo) {
     const int r = std::max(1, style.layout.size_px / 8);
     cv::Mat all = ink.coverage.clone(), alpha;
     cv::extractChannel(ink.pictures, alpha, 3);
