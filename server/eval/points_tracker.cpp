@@ -11,7 +11,7 @@ constexpr double kStartPosition_m = 0.01, kStartRotation_rad = 0.01;
 constexpr double kStartVelocity_m_s = 0.05, kStartAngularVelocity_rad_s = 0.05;
 
 CameraMotion TrueMotion(const PointsFrame& frame) {
-  return {frame.world_from_camera, frame.velocity_in_world, frame.angular_velocity_in_camera};
+  return {frame.world_from_camera, frame.velocity_in_world, frame.angular_velocity_in_camera, {}};
 }
 
 /// Off the truth by what its sigmas say.

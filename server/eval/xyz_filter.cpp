@@ -25,7 +25,7 @@ Matrix12d StartCovariance() {
 }
 
 CameraMotion TrueMotion(const PointsFrame& frame) {
-  return {frame.world_from_camera, frame.velocity_in_world, frame.angular_velocity_in_camera};
+  return {frame.world_from_camera, frame.velocity_in_world, frame.angular_velocity_in_camera, {}};
 }
 
 }  // namespace
