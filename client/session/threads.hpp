@@ -57,7 +57,7 @@ class Session::Threads {
   std::optional<Acknowledger> acknowledger_;
   Timestamp heard_ns_ = 0, pinged_ns_ = 0;
   std::set<std::string> models_;  // fetched; the thread of edits
-  std::string ended_;  // why we ended the stream ourselves
+  std::string ended_;             // why we ended the stream ourselves
   bool listens_ = false;
   bool renewed_ = false;  // the stream was ended to ask for something else
 

@@ -34,7 +34,8 @@ struct Raw {
   std::string config, source, mount = "none", data_dir, camera, grpc = "127.0.0.1:50051",
                               http = "127.0.0.1:8080", gl = "osmesa", speed = "realtime", sim_truth,
                               web_root, public_url, trusted_proxy, tls_certificate, tls_key,
-                              client_ca, audio_in, audio_out, map = "last", team, team_name, team_token;
+                              client_ca, audio_in, audio_out, map = "last", team, team_name,
+                              team_token;
   std::map<std::string, AccessRole> client_roles;
   bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
   bool overlay_dots = false, overlay_axes = false, overlay_status = false;

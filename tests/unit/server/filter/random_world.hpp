@@ -27,7 +27,7 @@ class RandomWorld {
   }
   Eigen::Quaterniond Rotation() { return ExpQuaternion(NormalVector<3>(1.0)); }
   Rigid3 Pose(double spread = 1.0) { return {Rotation(), NormalVector<3>(spread)}; }
-  CameraMotion Motion() { return {Pose(), NormalVector<3>(0.5), NormalVector<3>(1.0)}; }
+  CameraMotion Motion() { return {Pose(), NormalVector<3>(0.5), NormalVector<3>(1.0), {}}; }
   std::mt19937_64& engine() { return engine_; }
 
  private:

@@ -68,7 +68,7 @@ TEST_P(ShippedModel, IsPushedToTheWallAndSinksToTheFloor) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedModel,
                          ::testing::Values("shelf", "desk", "pipe", "valve", "crate", "arrow",
-                                         "divider", "person", "inside"));
+                                           "divider", "person", "inside"));
 
 TEST(ShippedModels, AreWhatTheScriptWrites) {
   const std::filesystem::path out = std::filesystem::path(::testing::TempDir()) /
