@@ -199,7 +199,7 @@ std::pair<double, double> Innovations(double corner_sigma_px) {
   FilterState agile(options);
   Matrix12d p = 1e-4 * Matrix12d::Identity();
   p.bottomRightCorner<6, 6>() = Matrix6d::Identity();
-  agile.Reset({ToCameraMotion(truth).world_from_camera, Vector3d::Zero(), Vector3d::Zero()}, p);
+  agile.Reset({ToCameraMotion(truth).world_from_camera, Vector3d::Zero(), Vector3d::Zero(), {}}, p);
   constexpr double kFrame_s = 1.0 / 25.0;
   double m3 = 0, m1 = 0;
   int count = 0;
