@@ -74,6 +74,9 @@ const std::vector<Setting>& Settings() {
        "who comes by an invite waits until the wearer, or `saccade admit`, lets them in"},
       {"gl", "--gl", &Raw::gl, "osmesa | egl"},
       {"speed", "--speed", &Raw::speed, "realtime | max (every frame, as fast as it can)"},
+      {"map", "--map", &Raw::map,
+       "what was mapped before: last: looked for first | new: kept, not looked for | ID of one | "
+       "none: neither (saccade maps list)"},
       {nullptr, "--run-for", &Raw::run_for_s, "end after so many seconds"},
       {nullptr, "--sim-truth", &Raw::sim_truth, "JSON lines of the simulator's truth"},
       {"web_root", nullptr, &Raw::web_root, "the page's files; empty: where they were built"},
@@ -85,10 +88,6 @@ const std::vector<Setting>& Settings() {
        "PEM file: a client's certificate by it is an identity, its role in [client_roles]"},
       {"tls.required", nullptr, &Raw::tls_required, "TLS on loopback, too"},
       {"auth.required", nullptr, &Raw::auth_required, "invites on loopback, too"},
-      {"map", "--map", &Raw::map,
-       "what was mapped before: last: looked for first | new: kept, not looked for | ID of one "
-       "(saccade "
-       "maps list) | none: neither"},
       {"audio.in", "--audio-in", &Raw::audio_in,
        "microphone of a wearable without a browser, by ALSA's name: default, plughw:1,0"},
       {"audio.out", "--audio-out", &Raw::audio_out, "its loudspeaker, likewise"},

@@ -87,6 +87,7 @@ const std::map<std::string, Least>& Promised() {
       {"MapService/Reset", kPilot},
       {"MapService/Save", kPilot},
       {"MapService/Load", kPilot},
+      {"MapService/Delete", kPilot},
       {"GazeService/GetState", kViewer},
       {"GazeService/GetMountCalibration", kViewer},
       {"GazeService/AcquireLease", kPilot},
