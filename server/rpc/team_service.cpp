@@ -23,7 +23,7 @@ absl::Status NoTeam() {
 }  // namespace
 
 /// One Follow: at most one write under way. Owns itself from Keep until OnDone.
-class TeamService::Follower final : public grpc::ServerWriteReactor<v1::TeamNews>,
+class TeamService::Follower final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
                                     public std::enable_shared_from_this<Follower> {
  public:
   explicit Follower(TeamService& service) : service_(service) {}
@@ -62,7 +62,8 @@ class TeamService::Follower final : public grpc::ServerWriteReactor<v1::TeamNews
     {
       const std::lock_guard lock(mutex_);
       if (writing_ || finished_ || ending_ || waiting_.empty()) return;
-      news_ = ToProto(*waiting_.front());
+      const grpc::Slice bytes(ToProto(*waiting_.front()).SerializeAsString());
+      news_ = grpc::ByteBuffer(&bytes, 1);
       waiting_.pop_front();
       writing_ = true;
     }
@@ -93,7 +94,7 @@ class TeamService::Follower final : public grpc::ServerWriteReactor<v1::TeamNews
   std::shared_ptr<void> listening_;
   std::mutex mutex_;
   std::deque<std::shared_ptr<const TeamNews>> waiting_;
-  v1::TeamNews news_;  // being written while writing_
+  grpc::ByteBuffer news_;  // being written while writing_
   bool writing_ = false, finished_ = false;
   std::optional<grpc::Status> ending_;
 };
@@ -133,18 +134,24 @@ grpc::ServerUnaryReactor* TeamService::GetTeam(grpc::CallbackServerContext* cont
   return call.Finish(absl::OkStatus());
 }
 
-grpc::ServerWriteReactor<v1::TeamNews>* TeamService::Follow(grpc::CallbackServerContext* context,
-                                                            const v1::FollowTeamRequest* request) {
+grpc::ServerWriteReactor<grpc::ByteBuffer>* TeamService::Follow(
+    grpc::CallbackServerContext* context, const grpc::ByteBuffer* encoded) {
   auto follower = std::make_shared<Follower>(*this);
   Follower* const reactor = follower.get();
-  absl::Status status = gate_.Arrive(*context, request->ByteSizeLong());
+  absl::Status status = gate_.Arrive(*context, encoded->Length());
+  v1::FollowTeamRequest request;
+  grpc::ByteBuffer buffer = *encoded;  // the same bytes: reading one empties it
+  if (status.ok() &&
+      !grpc::SerializationTraits<v1::FollowTeamRequest>::Deserialize(&buffer, &request).ok()) {
+    status = absl::InvalidArgumentError("request: is no FollowTeamRequest");
+  }
   if (status.ok()) {
     const absl::StatusOr<Access> access = gate_.Enter(*context, kFollow, Toll::kSubscribe);
     status = access.status();
     if (access.ok()) follower->access_id = access->id;
   }
   if (status.ok() && team_ == nullptr) status = NoTeam();
-  if (status.ok()) status = wire::CheckUuid(request->device_id(), "device_id");
+  if (status.ok()) status = wire::CheckUuid(request.device_id(), "device_id");
   {
     const std::lock_guard guard(mutex_);
     if (status.ok() && stopped_) status = absl::UnavailableError("the server is shutting down");

@@ -9,9 +9,14 @@
 
 namespace saccade {
 
+/// Follow gets its bytes unparsed: who is refused costs no parsing.
+using TeamServiceBase =
+    v1::TeamService::WithCallbackMethod_Tell<v1::TeamService::WithRawCallbackMethod_Follow<
+        v1::TeamService::WithCallbackMethod_GetTeam<v1::TeamService::Service>>>;
+
 /// saccade.v1.TeamService: another wearer's server, over `server/app/team_runner`. Handlers run on
 /// gRPC's threads and never block; a follower who reads too slowly misses keyframes, oldest first.
-class TeamService final : public v1::TeamService::CallbackService {
+class TeamService final : public TeamServiceBase {
  public:
   static constexpr std::size_t kMaxFollowers = 16;
 
@@ -21,8 +26,8 @@ class TeamService final : public v1::TeamService::CallbackService {
   grpc::ServerUnaryReactor* Tell(grpc::CallbackServerContext* context,
                                  const v1::TellTeamRequest* request,
                                  v1::TellTeamResponse* response) override;
-  grpc::ServerWriteReactor<v1::TeamNews>* Follow(grpc::CallbackServerContext* context,
-                                                 const v1::FollowTeamRequest* request) override;
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* Follow(grpc::CallbackServerContext* context,
+                                                     const grpc::ByteBuffer* encoded) override;
   grpc::ServerUnaryReactor* GetTeam(grpc::CallbackServerContext* context,
                                     const v1::GetTeamRequest* request,
                                     v1::GetTeamResponse* response) override;
