@@ -34,8 +34,8 @@ if(SACCADE_ARCH STREQUAL x86-64-v3)
   target_compile_definitions(saccade_cpu_check PRIVATE SACCADE_NEEDS_X86_64_V3)
 endif()
 
-# Several sources as one unit: Eigen's and gRPC's templates are instantiated once for all of them, and all is
-# built in half the time. For whoever builds everything (deploy/); whoever edits one file wants it off.
+# Several sources as one unit: Eigen's and gRPC's templates are instantiated once for all of them. For
+# whoever builds everything (deploy/); whoever edits one file wants it off.
 option(SACCADE_UNITY "Compile several sources of a target as one unit" OFF)
 if(SACCADE_UNITY)
   set(CMAKE_UNITY_BUILD ON)
