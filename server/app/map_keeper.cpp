@@ -4,6 +4,8 @@
 #include <absl/strings/str_format.h>
 
 #include <ctime>
+#include <future>
+#include <thread>
 #include <utility>
 
 #include "server/anchors/edit_checks.hpp"
@@ -74,8 +76,26 @@ absl::Status MapKeeper::Write(const StoredWorld& stored, const std::string& id,
   return shelf_.Save(std::move(facts), *stored.map);
 }
 
-void MapKeeper::KeepLast(const StoredWorld& stored) {
+void MapKeeper::Drain() {
+  std::promise<void> done;
+  std::future<void> drained = done.get_future();
+  absl::Status posted;
+  // A full queue is busy, not closed: room comes.
+  do {
+    posted = work_.Post([&done] { done.set_value(); });
+    if (absl::IsResourceExhausted(posted))
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  } while (absl::IsResourceExhausted(posted));
+  if (posted.ok()) drained.wait();
+}
+
+void MapKeeper::Stop() {
+  Drain();  // a runner that stops drops what waits, and each job owes an answer
   work_.Stop();
+}
+
+void MapKeeper::KeepLast(const StoredWorld& stored) {
+  Stop();
   KeepIfNew(stored);
 }
 

@@ -33,7 +33,8 @@ class MapKeeper final : public KeptMaps {
   /// Writes it before it returns; for the end of the run. Its last news is kept, whatever fails is
   /// said on stderr.
   void KeepLast(const StoredWorld& stored);
-  void Stop() { work_.Stop(); }
+  /// Answers everything that was asked before it returns; what is asked after it is refused.
+  void Stop();
 
   /// The newest map, or that of `id`, for the start of the run; nothing: there is none. Errors as
   /// MapShelf::Load.
@@ -47,6 +48,8 @@ class MapKeeper final : public KeptMaps {
  private:
   /// Runs on the thread; `refused` says why it will not.
   void Post(std::function<void()> job, const DoneEmpty& refused);
+  /// Waits until the thread has done what was posted so far.
+  void Drain();
   void KeepIfNew(const StoredWorld& stored);
   absl::Status Write(const StoredWorld& stored, const std::string& id, const std::string& name);
 

@@ -224,8 +224,20 @@ void Fields(Archive& archive, StoredMap& map) {
   All(archive, map.places, kThumbnail * sizeof(float));
 }
 
-/// Rising ids, each of a kind that its list is for.
+/// Rising ids, each of a kind that its list is for, with room for those that come after them.
 bool Agrees(const StoredMap& map) {
+  // The graph counts by keyframe, from its first to its next.
+  constexpr KeyframeId kMostKeyframes = 10'000'000;
+  constexpr FeatureId kMostFeatures = FeatureId{1} << 48;
+  const auto& keyframes = map.keyframes.keyframes;
+  if (!keyframes.empty() &&
+      (keyframes.begin()->first < 0 || keyframes.rbegin()->first > kMostKeyframes)) {
+    return false;
+  }
+  for (const auto& [id, point] : map.keyframes.points) {
+    if (id > kMostFeatures) return false;
+  }
+  if (!map.known.empty() && map.known.back().id > kMostFeatures) return false;
   FeatureId newest = 0;
   for (const Landmark& landmark : map.known) {
     if (landmark.id <= newest || !landmark.known) return false;

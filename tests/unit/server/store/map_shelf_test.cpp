@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string>
 
 namespace saccade::map_shelf_test {
@@ -127,6 +128,19 @@ TEST_F(MapShelfTest, WhatIsDamagedOrNewerIsRefusedByName) {
   EXPECT_THAT(std::string(refused.message()), HasSubstr("version 9"));
   EXPECT_TRUE(shelf.List().empty());
   EXPECT_EQ(Read(kFirst), newer) << "and nothing is lost";
+}
+
+// The graph has a count for each keyframe from its first to its newest.
+TEST_F(MapShelfTest, IdsThatLeaveNoRoomAreRefused) {
+  for (const KeyframeId far : {KeyframeId{1} << 40, std::numeric_limits<KeyframeId>::max()}) {
+    StoredMap map = SmallMap();
+    map.keyframes.keyframes[far] = {};
+    EXPECT_FALSE(DecodeMap(EncodeMap(map)).ok()) << far;
+  }
+  StoredMap map = SmallMap();
+  map.known.back().id = std::numeric_limits<FeatureId>::max();
+  EXPECT_FALSE(DecodeMap(EncodeMap(map)).ok());
+  EXPECT_TRUE(DecodeMap(EncodeMap(SmallMap())).ok());
 }
 
 TEST_F(MapShelfTest, AnIdLeadsNowhereElse) {
