@@ -54,6 +54,7 @@ struct RenderArguments {
   std::filesystem::path out;
   std::filesystem::path camera;  // record: instead of the source's own camera.yaml
   double seconds = 0;            // record: end after so long; 0: with the source
+  bool depth = false;            // render: DIR/000123.depth.png beside each picture
 };
 struct CalibrateArguments {
   std::string source, frames;
@@ -116,7 +117,9 @@ absl::Status ScoreCommand(const ScoreArguments& arguments);
 /// the map was rightly given up.
 absl::Status RestartCommand(const RestartArguments& arguments);
 absl::Status SimCommand(const SimArguments& arguments);
-/// Writes frames of a simulated source as the lens saw them, without noise: DIR/000123.png.
+/// Writes frames of a simulated source as the lens saw them, without noise: DIR/000123.png, and
+/// with `depth` DIR/000123.depth.png: along the optic axis, 16 bit, 5000 a metre, 0 where nothing
+/// is or it is beyond 13.1 m (the layout of the TUM RGB-D data sets).
 absl::Status RenderCommand(const RenderArguments& arguments);
 /// Writes a simulated source as a recording in TUM layout, noise and all: rgb/, rgb.txt,
 /// camera.yaml and groundtruth.txt. It names no target, so it starts as a recording of a room does.

@@ -175,6 +175,7 @@ void AddRender(CLI::App& app, RenderArguments& arguments) {
   render->add_option("--source", arguments.source, "sim:desk[?key=value&...]")->required();
   render->add_option("--frames", arguments.frames, "Half-open range A:B of frames, from zero");
   render->add_option("--out", arguments.out, "Folder for 000000.png ...")->required();
+  render->add_flag("--depth", arguments.depth, "Also 000000.depth.png ...: 16 bit, 5000 a metre");
 }
 
 void AddRecord(CLI::App& app, RenderArguments& arguments) {

@@ -3,6 +3,7 @@
 #include <absl/strings/strip.h>
 
 #include <iostream>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 
 #include "server/capture/camera_yaml.hpp"
@@ -45,6 +46,16 @@ absl::Status WritePicture(const std::filesystem::path& file, const cv::Mat& pict
       absl::StrCat("--out ", file.string(), ": cannot be written; is the folder writable?"));
 }
 
+absl::Status WriteDepth(const std::filesystem::path& file, const absl::StatusOr<cv::Mat>& depth_m) {
+  if (!depth_m.ok()) return depth_m.status();
+  constexpr double kPerMetre = 5000;
+  const cv::Mat beyond = *depth_m > std::numeric_limits<std::uint16_t>::max() / kPerMetre;
+  cv::Mat depth;
+  depth_m->convertTo(depth, CV_16UC1, kPerMetre);
+  depth.setTo(0, beyond);
+  return WritePicture(file, depth);
+}
+
 }  // namespace
 
 absl::Status RenderCommand(const RenderArguments& arguments) {
@@ -58,6 +69,12 @@ absl::Status RenderCommand(const RenderArguments& arguments) {
     const std::filesystem::path file = arguments.out / absl::StrFormat("%06d.png", frame);
     if (absl::Status status = WritePicture(file, *picture); !status.ok()) return status;
     std::cout << file.string() << "\n";
+    if (!arguments.depth) continue;
+    const std::filesystem::path beside = arguments.out / absl::StrFormat("%06d.depth.png", frame);
+    if (absl::Status status = WriteDepth(beside, frames->source->RenderDepth(frame));
+        !status.ok()) {
+      return status;
+    }
   }
   return absl::OkStatus();
 }

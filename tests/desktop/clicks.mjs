@@ -1,18 +1,11 @@
 // Twenty cubes, ten by the video and ten by the map, while the wearer moves: the same script as the
 // browser's test (web/test/browser/checks.mjs), and its figures.
-import {
-  inCamera,
-  inWorld,
-  length,
-  minus,
-  project,
-  unproject,
-} from '../../web/test/browser/optics.mjs';
+import { clickedPoint } from '../../web/test/browser/clicked.mjs';
+import { inCamera, length, minus, project } from '../../web/test/browser/optics.mjs';
 import { median } from '../../web/test/browser/pictures.mjs';
 
 const PER_PANE = 10;
 const MAPPED_M = 0.05; // in the map one can only click what it shows: a feature this near to the object
-const AIM_PX = 15; // a click farther than this from its object missed it: not counted, tried again
 const LIVE_HZ = 15;
 const PER_OBJECT = 2; // in the video: where few are in view for long, two edges would be half of all
 
@@ -86,7 +79,7 @@ async function placeMany(context, pane, aim) {
       continue;
     }
     used.set(click.name, (used.get(click.name) ?? 0) + 1);
-    const hit = click.where();
+    const hit = await click.where();
     if (!hit) {
       screen.press('ctrl+z'); // missed: the wearer had moved on
       await desktop.until(
@@ -127,7 +120,7 @@ const candidates = (frame, used) =>
 export const covered = ({ inset: [x, y, w, h] }, [u, v]) =>
   u > x - 10 && u < x + w + 10 && v > y - 10 && v < y + h + 10;
 
-async function aimInVideo({ desktop, screen, truth }, used) {
+async function aimInVideo({ desktop, screen, truth, depths }, used) {
   const shown = desktop.look();
   const { frame: id, left, top, scale, width, height, camera } = shown.video;
   const frame = truth.frame(id);
@@ -139,20 +132,15 @@ async function aimInVideo({ desktop, screen, truth }, used) {
     const at = [left + (u + 0.5) * scale, top + (v + 0.5) * scale];
     if (covered(shown, at)) continue;
     screen.click(at);
-    return { name, where: () => clickedPoint(desktop, truth, camera, name) };
+    return {
+      name,
+      where: () => {
+        const [id, ...pressed] = desktop.look().pressed;
+        return clickedPoint({ id, pixel: pressed }, truth, camera, name, depths);
+      },
+    };
   }
   return undefined;
-}
-
-/** What lay under the click in the frame that was clicked, at its object's depth. */
-function clickedPoint(desktop, truth, camera, name) {
-  const [id, ...pixel] = desktop.look().pressed;
-  const frame = truth.frame(id);
-  const object = frame?.objects.find((entry) => entry.name === name);
-  if (!object?.pixel || !object.visible || length(minus(object.pixel, pixel)) > AIM_PX)
-    return undefined;
-  const depth = inCamera(frame.world_from_camera, object.point_in_world_m)[2];
-  return { point: inWorld(frame.world_from_camera, unproject(camera, pixel, depth)), depth };
 }
 
 /** As a person would: turn the wheel over the object until it is near, then click it. */

@@ -44,7 +44,9 @@ for (const [program, pack] of [
   console.log(`skipped: no ${program}; install ${pack}`);
   process.exit(77);
 }
-const { startServer, renderTruth, Truth } = await import('../../web/test/browser/server.mjs');
+const { startServer, renderDepths, renderTruth, Truth } = await import(
+  '../../web/test/browser/server.mjs'
+);
 const { Screen } = await import('./screen.mjs');
 const { Desktop } = await import('./desktop.mjs');
 const parts = {
@@ -94,6 +96,7 @@ context.annotations = () => ask('annotations', 'list');
 context.map = () => ask('map');
 context.status = () => ask('status');
 context.render = (id) => renderTruth(options.evaluator, source, id, join(folder, 'render'));
+context.depths = (id) => renderDepths(options.evaluator, source, id, join(folder, 'depths'));
 context.shot = (name) => {
   if (options.shots) context.screen.shot(join(options.shots, `${name}-${options.size}.png`));
 };

@@ -5,20 +5,20 @@ import { AnnotationService } from '../../src/gen/saccade/v1/annotation_pb.js';
 import { MapService } from '../../src/gen/saccade/v1/map_pb.js';
 import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
 import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
+import { clickedPoint } from './clicked.mjs';
 import { Expert } from './expert.mjs';
 import { frozenPicture } from './freeze.mjs';
 import { AT_OUTLINES } from './outlines.mjs';
 import { CLEAR, displacement, REACH_PX } from './outline.mjs';
-import { cubePixels, inCamera, inWorld, length, minus, project, unproject } from './optics.mjs';
+import { cubePixels, inCamera, length, minus, project } from './optics.mjs';
 import { decodePng, median, pixelsOf, psnr } from './pictures.mjs';
-import { renderTruth, startServer, Truth } from './server.mjs';
+import { renderDepths, renderTruth, startServer, Truth } from './server.mjs';
 
 const ACCENT = [0xc4, 0xb0, 0xff]; // the selected mark
 const CUBE_M = 0.05;
 const PICTURES = 10;
 const PER_PANE = 10;
 const MAPPED_M = 0.05; // in the map one can only click what it shows: a feature this near to the object
-const AIM_PX = 15; // a click farther than this from its object missed it: not counted, tried again
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -48,6 +48,7 @@ export async function runChecks({
     ]);
   const context = { failures: 0, shots, server: await start() };
   context.render = (id) => renderTruth(evaluator, source, id, join(folder, 'truth'));
+  context.depths = (id) => renderDepths(evaluator, source, id, join(folder, 'depths'));
   let since = Date.now();
   context.check = (name, ok, figures) => {
     const seconds = ((Date.now() - since) / 1000).toFixed(0);
@@ -222,7 +223,7 @@ const leading = ({ truth, lag = 0 }, frame, { name, pixel }) => {
 };
 
 export async function aimInVideo(context, used) {
-  const { expert, truth, camera } = context;
+  const { expert, truth, camera, depths } = context;
   const { id, left, top, scale, width, height } = await expert.look();
   const frame = truth.frame(id);
   if (!frame) return undefined;
@@ -234,19 +235,12 @@ export async function aimInVideo(context, used) {
     await expert.click(at);
     const pressed = await expert.pressed();
     context.lag = ((context.lag ?? 0) + Math.min(30, pressed.id - id)) / 2;
-    return { name: object.name, where: () => clickedPoint(pressed, truth, camera, object.name) };
+    return {
+      name: object.name,
+      where: () => clickedPoint(pressed, truth, camera, object.name, depths),
+    };
   }
   return undefined;
-}
-
-/** What lay under the click in the frame that was clicked, at its object's depth. */
-function clickedPoint({ id, pixel }, truth, camera, name) {
-  const frame = truth.frame(id);
-  const object = frame?.objects.find((entry) => entry.name === name);
-  if (!object?.pixel || !object.visible || length(minus(object.pixel, pixel)) > AIM_PX)
-    return undefined;
-  const depth = inCamera(frame.world_from_camera, object.point_in_world_m)[2];
-  return { point: inWorld(frame.world_from_camera, unproject(camera, pixel, depth)), depth };
 }
 
 /** Of these objects those that the map shows something of. */

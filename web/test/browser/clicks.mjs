@@ -11,7 +11,7 @@ import { delayed } from './delay.mjs';
 import { Expert } from './expert.mjs';
 import { quantile } from './laser.mjs';
 import { inCamera, length, minus, project } from './optics.mjs';
-import { startServer, Truth } from './server.mjs';
+import { renderDepths, startServer, Truth } from './server.mjs';
 
 const LATE_MS = 400; // each way: the picture is that old, and the answer comes after twice as long
 const COUNT = 200;
@@ -21,14 +21,24 @@ const BAR = { video: 0.05, frozen: 0.05, map: 0.05 }; // of the depth, in the me
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-export async function runClicks({ server: binary, chromium, seed, folder, count = COUNT, only }) {
+export async function runClicks({
+  server: binary,
+  evaluator,
+  chromium,
+  seed,
+  folder,
+  count = COUNT,
+  only,
+}) {
+  const source = `sim:desk?seed=${seed}&motion=sway&fps=15`;
   const truthFile = join(folder, 'clicks.jsonl');
   const server = await startServer(binary, [
-    ...['--source', `sim:desk?seed=${seed}&motion=sway&fps=15`, '--sim-truth', truthFile],
+    ...['--source', source, '--sim-truth', truthFile],
     ...['--data-dir', join(folder, 'clicks-data')],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);
   const context = { failures: 0, truth: new Truth(truthFile) };
+  context.depths = (id) => renderDepths(evaluator, source, id, join(folder, 'depths'));
   context.check = (name, ok, figures) => {
     console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
     if (!ok) ++context.failures;

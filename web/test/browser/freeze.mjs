@@ -7,6 +7,7 @@ import { decodePng, greyOf, median, psnr } from './pictures.mjs';
 
 const OBJECTS = 5; // clicked at once, and again when the frame is gone; of three, two may lie on outlines
 const RING_S = 10; // how long the server keeps a frame
+const CLAIMED_SHARE = 0.1; // of the depth: who claims more makes no promise to be held to
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -76,9 +77,11 @@ export async function frozenPicture(context) {
       return (known.get(key)?.errorMm ?? 0) / 1000 / depth;
     });
     const refused = ids.find((entry) => entry.refused)?.refused;
+    // Where nothing but the wall behind has features, as on a plain tin, the mark itself says that it is not known.
+    const vouched = errors.filter((_, i) => claimed[i] < CLAIMED_SHARE);
     check(
-      `clicks in the frozen picture${gone ? ` after ${RING_S} s` : ''}, median error below ${100 * share} % of depth`,
-      errors.length > 0 && median(errors) < share,
+      `clicks in the frozen picture${gone ? ` after ${RING_S} s` : ''} that claim to be known, median error below ${100 * share} % of depth`,
+      vouched.length > 0 && median(vouched) < share,
       refused ?? errors.map((e, i) => `${ids[i].object.name} ${(100 * e).toFixed(2)} %`).join(', '),
     );
     check(

@@ -3,6 +3,20 @@ import pngjs from 'pngjs';
 /** {width, height, data (RGBA)} of a PNG. */
 export const decodePng = (bytes) => pngjs.PNG.sync.read(Buffer.from(bytes));
 
+const DEPTH_PER_METRE = 5000; // as the TUM RGB-D data sets
+
+/** `at([u, v])`: depth along the optic axis [m] at the nearest pixel, 0 where nothing is or beyond the picture. */
+export function decodeDepthPng(bytes) {
+  const { width, height, data } = pngjs.PNG.sync.read(Buffer.from(bytes), { skipRescale: true });
+  return {
+    at: ([u, v]) => {
+      const [column, row] = [Math.round(u), Math.round(v)];
+      if (column < 0 || row < 0 || column >= width || row >= height) return 0;
+      return data[4 * (row * width + column)] / DEPTH_PER_METRE;
+    },
+  };
+}
+
 /** Peak signal to noise ratio of the colours of two pictures of one size [dB]. */
 export function psnr(a, b) {
   if (a.width !== b.width || a.height !== b.height) {

@@ -3,7 +3,7 @@ import { execFile, spawn } from 'node:child_process';
 import { closeSync, openSync, readFileSync, readSync } from 'node:fs';
 import { join } from 'node:path';
 import { promisify } from 'node:util';
-import { decodePng } from './pictures.mjs';
+import { decodeDepthPng, decodePng } from './pictures.mjs';
 
 /** Starts a server; resolves when it serves. `http` is its page's address, `address` that without scheme. */
 export async function startServer(binary, args, prefix = []) {
@@ -81,17 +81,23 @@ export class Truth {
   }
 }
 
+/** Draws the simulator's frame `id` as it is without noise; where its files are, without their endings. */
+async function rendered(evaluator, source, id, out, ...flags) {
+  const frames = ['--frames', `${id}:${id + 1}`];
+  await promisify(execFile)(evaluator, [
+    ...['render', '--source', source, ...frames, '--out', out, ...flags],
+  ]);
+  return join(out, String(id).padStart(6, '0'));
+}
+
 /** The simulator's frame `id` as it is without noise, drawn by saccade-eval. */
 export async function renderTruth(evaluator, source, id, out) {
-  const range = `${id}:${id + 1}`;
-  await promisify(execFile)(evaluator, [
-    'render',
-    '--source',
-    source,
-    '--frames',
-    range,
-    '--out',
-    out,
-  ]);
-  return decodePng(readFileSync(join(out, `${String(id).padStart(6, '0')}.png`)));
+  return decodePng(readFileSync(`${await rendered(evaluator, source, id, out)}.png`));
+}
+
+/** How far off everything in frame `id` is: decodeDepthPng of what saccade-eval drew. */
+export async function renderDepths(evaluator, source, id, out) {
+  return decodeDepthPng(
+    readFileSync(`${await rendered(evaluator, source, id, out, '--depth')}.depth.png`),
+  );
 }
