@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/app/entrance.hpp"
+#include "client/app/library.hpp"
 #include "client/app/snapshot.hpp"
 #include "client/cli/interrupt.hpp"
 #include "client/cli/session_file.hpp"
@@ -60,6 +61,7 @@ absl::Status App::AddTab(const Options& options, const Address& address) {
     return file.ok() ? absl::StrCat("Kept as ", file->string())
                      : absl::StrCat("No snapshot: ", file.status().message());
   };
+  tab.desk->library = LibraryModels();
   auto view = view::DeskView::Create(window_->gl(), *tab.desk);
   if (!view.ok()) return view.status();
   tab.view = *std::move(view);
@@ -256,7 +258,11 @@ void App::DrawPanels(Timestamp now_ns) {
   std::vector<view::Desk*> desks;
   for (const Tab& each : tabs_) desks.push_back(each.desk.get());
   view::DrawTools(context, layout_.tools);
-  view::DrawAnnotations(context, layout_.panel);
+  if (tab().desk->state().tool == tools::Action::kThings) {
+    view::DrawThings(context, layout_.panel);
+  } else {
+    view::DrawAnnotations(context, layout_.panel);
+  }
   view::DrawTalk(context, layout_.talk);
   view::DrawGaze(context, layout_.gaze);
   view::DrawStrip(context, layout_.strip);

@@ -124,6 +124,15 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
                         at.top + (pixel->y() + 0.5) * at.scale};
     }
   }
+  if (state.tool == tools::Action::kThings) {
+    json buttons = json::object();
+    for (const auto& [words, rect] : state.things.buttons) buttons[words] = RectOf(rect);
+    line["things"] = {{"said", state.things.said},
+                      {"busy", state.things.busy},
+                      {"selected", state.things.selected_id},
+                      {"count", told.scene.scene().objects.size()},
+                      {"buttons", std::move(buttons)}};
+  }
   if (told.statistics) line["tracked_hz"] = told.statistics->tracked_fps_hz;
   if (const auto& pressed = desk.pressed()) {
     line["pressed"] = {pressed->frame_id, pressed->pixel.x(), pressed->pixel.y()};

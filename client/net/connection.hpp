@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "client/net/scene_types.hpp"
 #include "client/net/types.hpp"
 #include "shared/scene/annotation.hpp"
 
@@ -106,6 +107,14 @@ class Connection {
   absl::StatusOr<Picture> GetPicture(const std::string& id);
   /// The GLB file of a model of the scene, `bytes` long.
   absl::StatusOr<std::string> GetModel(const std::string& id, std::uint32_t bytes);
+  /// Sends a GLB file; the same one again is the same model.
+  absl::StatusOr<ModelFacts> UploadModel(const std::string& name, const std::string& glb);
+  /// Adds an object (`id` empty) or replaces it; nothing stops it.
+  absl::StatusOr<SceneObject> PutThing(const SceneObject& object);
+  absl::Status RemoveThing(const std::string& id);
+  /// Lets it go where `object` says, after a push if there is one, lowered until it rests.
+  absl::StatusOr<PlacedThing> PlaceThing(const SceneObject& object,
+                                         const std::optional<Eigen::Vector3d>& push);
   /// What was undone or redone, in words. Acts on the person's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();

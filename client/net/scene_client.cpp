@@ -7,6 +7,7 @@
 
 #include "client/net/channel.hpp"
 #include "client/net/convert.hpp"
+#include "client/net/model_upload.hpp"
 #include "client/net/scene_convert.hpp"
 #include "saccade/v1/scene.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
@@ -15,19 +16,6 @@
 #include "shared/wire/to_proto.hpp"
 
 namespace saccade::net {
-namespace {
-
-constexpr std::size_t kPiece = 200 * 1024;
-
-absl::StatusOr<Touch> FromProto(const v1::SceneContact& message) {
-  absl::StatusOr<Eigen::Vector3d> point =
-      wire::FromProto(message.point_in_world_m(), "point_in_world_m");
-  if (!point.ok()) return point.status();
-  return Touch{message.object_id(), message.object_name(), *point, message.moved_m()};
-}
-
-}  // namespace
-
 class SceneClient::Impl {
  public:
   explicit Impl(const ConnectionOptions& options)
@@ -119,42 +107,20 @@ absl::Status SceneClient::Remove(const std::string& id) {
 absl::StatusOr<PlacedThing> SceneClient::Place(const SceneObject& object,
                                                const std::optional<Eigen::Vector3d>& push,
                                                const std::optional<Eigen::Vector3d>& gravity) {
-  v1::PlaceSceneObjectRequest request;
-  *request.mutable_object() = wire::ToProto(object);
-  if (push) *request.mutable_push_in_world() = wire::ToProto(*push);
-  if (gravity) *request.mutable_gravity_in_world() = wire::ToProto(*gravity);
-  const auto answer = impl_->Ask(&v1::SceneService::Stub::PlaceObject, request);
+  const auto answer =
+      impl_->Ask(&v1::SceneService::Stub::PlaceObject, PlaceRequest(object, push, gravity));
   if (!answer.ok()) return answer.status();
-  PlacedThing placed;
-  absl::StatusOr<SceneObject> at_rest = wire::FromProto(answer->object(), "object");
-  if (!at_rest.ok()) return at_rest.status();
-  placed.object = *std::move(at_rest);
-  absl::StatusOr<Touch> support = FromProto(answer->support());
-  if (!support.ok()) return support.status();
-  placed.support = *std::move(support);
-  if (!answer->has_stop()) return placed;
-  absl::StatusOr<Touch> stop = FromProto(answer->stop());
-  if (!stop.ok()) return stop.status();
-  placed.stop = *std::move(stop);
-  return placed;
+  return FromProto(*answer);
 }
 
 absl::StatusOr<ModelFacts> SceneClient::Upload(const std::string& name, const std::string& glb,
                                                const std::function<void(std::size_t)>& progress) {
-  if (glb.empty()) return absl::InvalidArgumentError("model: the file is empty");
-  v1::UploadModelRequest request;
-  request.set_upload_id(RandomUuid());
-  request.set_name(name);
-  request.set_total_bytes(static_cast<std::uint32_t>(glb.size()));
-  for (std::size_t offset = 0; offset < glb.size(); offset += kPiece) {
-    request.set_offset_bytes(static_cast<std::uint32_t>(offset));
-    request.set_data(glb.substr(offset, kPiece));
-    const auto answer = impl_->Ask(&v1::SceneService::Stub::UploadModel, request);
-    if (!answer.ok()) return answer.status();
-    progress(answer->received_bytes());
-    if (answer->has_model()) return FromProto(answer->model());
-  }
-  return absl::InternalError("the server did not say what it read");
+  return UploadInPieces(
+      name, glb,
+      [this](const v1::UploadModelRequest& request) {
+        return impl_->Ask(&v1::SceneService::Stub::UploadModel, request);
+      },
+      progress);
 }
 
 absl::StatusOr<RegisteredThing> SceneClient::Register(

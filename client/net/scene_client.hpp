@@ -22,16 +22,6 @@ struct SceneList {
   std::vector<SceneObject> objects;
   std::vector<ModelFacts> models;
 };
-struct Touch {
-  std::string object_id, object_name;
-  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
-  double moved_m = 0;
-};
-struct PlacedThing {
-  SceneObject object;
-  std::optional<Touch> stop;  // none: it was not pushed
-  Touch support;
-};
 struct RegisteredThing {
   SceneObject object;
   double rms_mm = 0, left_out_rms_mm = 0;

@@ -6,8 +6,19 @@
 
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/scene.hpp"
+#include "shared/wire/to_proto.hpp"
 
 namespace saccade::net {
+namespace {
+
+absl::StatusOr<Touch> TouchOf(const v1::SceneContact& message) {
+  absl::StatusOr<Eigen::Vector3d> point =
+      wire::FromProto(message.point_in_world_m(), "point_in_world_m");
+  if (!point.ok()) return point.status();
+  return Touch{message.object_id(), message.object_name(), *point, message.moved_m()};
+}
+
+}  // namespace
 
 absl::StatusOr<ModelFacts> FromProto(const v1::SceneModelFacts& message) {
   absl::StatusOr<Eigen::Vector3d> size = wire::FromProto(message.size_m(), "size_m");
@@ -37,6 +48,29 @@ absl::StatusOr<SceneChange> FromProto(const v1::SceneEvent& message) {
   if (!light.ok()) return light.status();
   change.light = *light;
   return change;
+}
+
+absl::StatusOr<PlacedThing> FromProto(const v1::PlaceSceneObjectResponse& message) {
+  absl::StatusOr<SceneObject> at_rest = wire::FromProto(message.object(), "object");
+  if (!at_rest.ok()) return at_rest.status();
+  absl::StatusOr<Touch> support = TouchOf(message.support());
+  if (!support.ok()) return support.status();
+  PlacedThing placed{*std::move(at_rest), std::nullopt, *std::move(support)};
+  if (!message.has_stop()) return placed;
+  absl::StatusOr<Touch> stop = TouchOf(message.stop());
+  if (!stop.ok()) return stop.status();
+  placed.stop = *std::move(stop);
+  return placed;
+}
+
+v1::PlaceSceneObjectRequest PlaceRequest(const SceneObject& object,
+                                         const std::optional<Eigen::Vector3d>& push,
+                                         const std::optional<Eigen::Vector3d>& gravity) {
+  v1::PlaceSceneObjectRequest request;
+  *request.mutable_object() = wire::ToProto(object);
+  if (push) *request.mutable_push_in_world() = wire::ToProto(*push);
+  if (gravity) *request.mutable_gravity_in_world() = wire::ToProto(*gravity);
+  return request;
 }
 
 }  // namespace saccade::net

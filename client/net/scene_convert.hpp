@@ -2,6 +2,8 @@
 
 #include <absl/status/statusor.h>
 
+#include <optional>
+
 #include "client/net/scene_types.hpp"
 #include "saccade/v1/scene.pb.h"
 
@@ -10,5 +12,11 @@ namespace saccade::net {
 
 absl::StatusOr<ModelFacts> FromProto(const v1::SceneModelFacts& message);
 absl::StatusOr<SceneChange> FromProto(const v1::SceneEvent& message);
+absl::StatusOr<PlacedThing> FromProto(const v1::PlaceSceneObjectResponse& message);
+
+/// `push`: of any length; `gravity`: unit, nothing: +y.
+v1::PlaceSceneObjectRequest PlaceRequest(const SceneObject& object,
+                                         const std::optional<Eigen::Vector3d>& push,
+                                         const std::optional<Eigen::Vector3d>& gravity);
 
 }  // namespace saccade::net

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,18 @@ struct ModelFacts {
   std::string id, name;
   std::uint32_t triangles = 0, bytes = 0;
   Eigen::Vector3d size_m = Eigen::Vector3d::Zero();
+};
+
+struct Touch {
+  std::string object_id, object_name;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  // [m]
+  double moved_m = 0;
+};
+/// How a thing came to rest.
+struct PlacedThing {
+  SceneObject object;
+  std::optional<Touch> stop;  // none: it was not pushed
+  Touch support;
 };
 
 /// What changed in the scene.

@@ -27,6 +27,8 @@ constexpr auto kControls = std::to_array<Control>({
     {kCheckList, kTool, "Check list", "j", "J", "click its place, then write what is to be done"},
     {kPicture, kTool, "Picture", "u", "U",
      "click its place, then name a picture or a PDF; or drop a file there"},
+    {kThings, kTool, "Things", "4", "4",
+     "furniture and machines to try: place them, push them to the wall"},
     {kGaze, kTool, "Look", "g", "G", "click what the camera should look at and hold"},
     {kUndo, kCommand, "Undo", "z", "Z", "take back your last change"},
     {kRedo, kCommand, "Redo", "y", "Y", "do it again"},

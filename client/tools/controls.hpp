@@ -23,6 +23,7 @@ enum class Action {
   kMeasure,
   kCheckList,
   kPicture,
+  kThings,
   kGaze,
   // What happens at once.
   kUndo,

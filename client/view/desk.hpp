@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <future>
 #include <map>
@@ -14,9 +15,11 @@
 #include "client/session/latency.hpp"
 #include "client/session/pointing.hpp"
 #include "client/session/session.hpp"
+#include "client/session/thing_edits.hpp"
 #include "client/talk/voice_room.hpp"
 #include "client/tools/drawn.hpp"
 #include "client/tools/orbit.hpp"
+#include "client/tools/things.hpp"
 #include "client/tools/view.hpp"
 #include "client/view/desk_state.hpp"
 #include "client/view/layout.hpp"
@@ -139,6 +142,17 @@ class Desk {
   const cv::Mat* PictureOf(const Annotation& mark);
   /// Where the mark that is dragged would be put [m].
   const std::optional<Eigen::Vector3d>& dragged_to() const { return dragged_to_; }
+  /// Models that come with the program, by name: GLB files.
+  std::map<std::string, std::filesystem::path> library;
+  /// What a click does with things; `model`: of the library or the server, where it places one.
+  void ChooseThingClick(ThingDesk::Click click, const std::string& model = "");
+  void SelectThing(const std::string& id) { state_.things.selected_id = id; }
+  /// The selected thing along the floor as the main pane sees it, until it touches.
+  void PushThing(tools::Way way);
+  /// By a step about the vertical.
+  void TurnThing(int sign);
+  void RemoveThing();
+  void UndoThing();
   /// Keeps a picture with its marks as a file, and says where; set by whoever knows where.
   std::function<std::string(const net::Still&, const Desk&)> keep_snapshot;
 
@@ -177,6 +191,16 @@ class Desk {
             std::function<void(const absl::StatusOr<PicturePtr>&)> done);
   bool CheckLoading();
   void LoadForDialog();
+  void UseThings(Pane pane, const std::optional<tools::Landing>& landing,
+                 const std::optional<RayTarget>& ray);
+  /// Where a thing would stand: on a known surface, else where the map says.
+  std::optional<Eigen::Vector3d> ThingPlace(const std::optional<tools::Landing>& landing,
+                                            const RayTarget& ray) const;
+  void PlaceThing(const std::string& model, const Rigid3& start);
+  /// The selected thing, if it is one that can be moved; else says why `what` was not done.
+  const SceneObject* Movable(const char* what);
+  void SayOfThings(const std::string& words, bool warn = false);
+  session::ThingEdits::Done TellOfThings();
   static AnnotationDraft PictureDraft(const PicturePtr& picture, const std::string& text);
   void Freeze(Timestamp now_ns);
   void Snapshot(Timestamp now_ns);
@@ -200,6 +224,7 @@ class Desk {
   talk::VoiceRoom voice_;
   session::Session session_;  // after player_ and voice_: it pushes there
   session::Edits edits_{session_};
+  session::ThingEdits thing_edits_{session_};
   session::GazePilot pilot_{session_};
   session::LatencyMeter latency_;
   session::RateMeter rate_;
@@ -217,6 +242,7 @@ class Desk {
   struct Pressed {
     std::optional<tools::Landing> landing;
     std::string picked_id;
+    std::optional<RayTarget> ray;
   };
   std::optional<Pressed> pressed_;
   std::optional<PixelTarget> pressed_pixel_;

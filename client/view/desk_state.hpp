@@ -86,6 +86,18 @@ struct TalkField {
   std::string problem;
 };
 
+/// Things of the scene: what a click does with them, and what came of the last one.
+struct ThingDesk {
+  enum class Click { kSelect, kMove, kPlace };
+  Click click = Click::kSelect;
+  std::string model;        // kPlace: the name of a model of the server or of the library
+  std::string selected_id;  // empty: none
+  std::string said;
+  bool warn = false;
+  bool busy = false;                    // the server is asked; what comes meanwhile is passed over
+  std::map<std::string, Rect> buttons;  // where the panel's are now, by their words; for tests
+};
+
 /// What this person is doing with one wearer. The thread that draws.
 class DeskState {
  public:
@@ -107,6 +119,7 @@ class DeskState {
   std::optional<TextEditor> editor;
   std::optional<PlacingDialog> dialog;
   TalkField talk;
+  ThingDesk things;
   std::vector<CopiedMark> copied;
   std::vector<Rect> above;  // what lies over the panes, of the picture on the screen
   tools::InkLine ink;

@@ -212,7 +212,21 @@ void DeskView::DrawVideo(const Rect& rect, const Canvas& canvas, ImDrawList* lis
   DrawGrips(Pane::kVideo, *view, painter);
 }
 
+void DeskView::DrawSelectedThing(const tools::View& view, Painter& painter) const {
+  if (desk_.state().tool != tools::Action::kThings) return;
+  const Scene& scene = desk_.session().scene.scene();
+  const SceneObject* thing = scene.Find(desk_.state().things.selected_id);
+  if (thing == nullptr || thing->parent != SceneParent::kWorld) return;
+  for (const auto& [from, to] : tools::EdgesOfBox(scene, *thing)) {
+    for (const Polyline2& piece :
+         ProjectPolyline(*view.camera, view.camera_from_world, {from, to})) {
+      painter.Line(piece, kAccent);
+    }
+  }
+}
+
 void DeskView::DrawGrips(Pane pane, const tools::View& view, Painter& painter) const {
+  DrawSelectedThing(view, painter);
   if (const std::optional<Annotation> mark = desk_.Turnable()) {
     if (const auto handle = view.Project(tools::HandlePoint(*mark))) painter.Handle(*handle);
   }

@@ -48,6 +48,7 @@ class DeskView {
   /// What is under way with the selected marks: a handle, a rectangle, the place that keys point
   /// at.
   void DrawGrips(Pane pane, const tools::View& view, Painter& painter) const;
+  void DrawSelectedThing(const tools::View& view, Painter& painter) const;
   void DrawSight(const tools::View& view, Painter& painter) const;
   std::string Note(Pane pane, Timestamp now_ns) const;
   static void OnMap(const ImDrawList* list, const ImDrawCmd* command);

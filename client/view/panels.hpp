@@ -28,6 +28,8 @@ std::size_t DrawTabs(const std::vector<Desk*>& desks, std::size_t shown, const R
 void DrawTools(const PanelContext& context, const Rect& rect);
 /// Every annotation with its state and live error; the colour of new ones; finding them.
 void DrawAnnotations(const PanelContext& context, const Rect& rect);
+/// Things of the scene, in the annotations' place while their tool is in hand.
+void DrawThings(const PanelContext& context, const Rect& rect);
 /// What the head does, how far off it is, who steers it, and what can be asked of it.
 void DrawGaze(const PanelContext& context, const Rect& rect);
 /// Where the time goes, and what was lost.

@@ -1,6 +1,6 @@
 // saccade-client in a real window against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--client PATH] [--server PATH] [--cli PATH] [--evaluator PATH] [--seed N] [--size WxH]
-//        [--shots DIR] [--part desktop|gaze]   (gaze: the turning of the head, two wearers in tabs, notes, ink)
+//        [--shots DIR] [--part desktop|gaze|things]   (gaze: the turning of the head, two wearers in tabs, notes, ink)
 import { spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync } from 'node:fs';
 import { createServer } from 'node:net';
@@ -52,6 +52,7 @@ const { Desktop } = await import('./desktop.mjs');
 const parts = {
   desktop: async () => (await import('./checks.mjs')).runDesktop,
   gaze: async () => (await import('./work.mjs')).runWork,
+  things: async () => (await import('./things.mjs')).runThings,
 };
 if (!(options.part in parts)) throw new Error(`--part: one of ${Object.keys(parts).join(', ')}`);
 const runPart = await parts[options.part]();
