@@ -1,6 +1,7 @@
 #include "server/app/make_team.hpp"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 #include <unistd.h>
 
 #include <cstring>
@@ -14,6 +15,7 @@ namespace saccade {
 namespace {
 
 constexpr std::size_t kIdBytes = 36;
+constexpr std::size_t kTokenBytes = 4096, kRootBytes = 65536;
 
 /// The same over restarts, so that others know their marks again.
 std::string DeviceId(const std::filesystem::path& data_dir) {
@@ -33,6 +35,19 @@ std::string NameOfMachine() {
   return gethostname(name, sizeof(name) - 1) == 0 ? name : "";
 }
 
+/// What a kept token was for: another server or a new invite makes it void.
+std::string Whose(const TeamLinkOptions& options) {
+  return absl::StrCat(options.address, " ", options.invite.substr(0, options.invite.find('.')));
+}
+
+/// Empty: none is kept, or it was for something else.
+std::string KeptToken(const std::filesystem::path& file, const TeamLinkOptions& options) {
+  const absl::StatusOr<std::string> kept = ReadRegularFile(file, kTokenBytes, "a token");
+  if (!kept.ok()) return "";
+  const std::pair<std::string, std::string> parts = absl::StrSplit(*kept, absl::MaxSplits('\n', 1));
+  return parts.first == Whose(options) ? parts.second : "";
+}
+
 }  // namespace
 
 std::unique_ptr<TeamRunner> MakeTeam(const ServerConfig& config, Engine& engine) {
@@ -47,10 +62,27 @@ std::unique_ptr<TeamRunner> MakeTeam(const ServerConfig& config, Engine& engine)
   return runner;
 }
 
-std::unique_ptr<TeamLink> LinkOf(const ServerConfig& config, TeamPort& team) {
-  if (!config.team) return nullptr;
-  return std::make_unique<TeamLink>(
-      TeamLinkOptions{config.team->ToString(config.team->port), config.team_token}, team);
+absl::StatusOr<std::optional<TeamLinkOptions>> LinkOf(const ServerConfig& config) {
+  if (!config.team) return std::nullopt;
+  TeamLinkOptions options;
+  options.address = config.team->ToString(config.team->port);
+  options.invite = config.team_invite;
+  options.name = config.team_name.empty() ? NameOfMachine() : config.team_name;
+  const std::filesystem::path kept = config.data_dir / "team_token";
+  options.token = config.team_token.empty() ? KeptToken(kept, options) : config.team_token;
+  options.keep_token = [kept, whose = Whose(options)](const std::string& token) {
+    if (const int error = WritePrivateFile(kept, absl::StrCat(whose, "\n", token)); error != 0) {
+      Log(absl::StrCat(kept.string(), ": ", std::strerror(error),
+                       "; the next start needs another --team-invite"));
+    }
+  };
+  if (!config.team_trust.empty()) {
+    absl::StatusOr<std::string> root =
+        ReadRegularFile(config.team_trust, kRootBytes, "--team-trust");
+    if (!root.ok()) return root.status();
+    options.root_pem = *std::move(root);
+  }
+  return options;
 }
 
 }  // namespace saccade

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <absl/status/statusor.h>
+
 #include <memory>
+#include <optional>
 
 #include "server/app/engine.hpp"
 #include "server/app/server_config.hpp"
@@ -13,7 +16,7 @@ namespace saccade {
 /// joined, and is idle until then. Hears of frames from `engine`, which must be stopped first.
 std::unique_ptr<TeamRunner> MakeTeam(const ServerConfig& config, Engine& engine);
 
-/// Null without --team.
-std::unique_ptr<TeamLink> LinkOf(const ServerConfig& config, TeamPort& team);
+/// Where --team leads; nothing without it. The error names the file that cannot be read.
+absl::StatusOr<std::optional<TeamLinkOptions>> LinkOf(const ServerConfig& config);
 
 }  // namespace saccade

@@ -35,7 +35,7 @@ struct Raw {
                               http = "127.0.0.1:8080", gl = "osmesa", speed = "realtime", sim_truth,
                               web_root, public_url, trusted_proxy, tls_certificate, tls_key,
                               client_ca, audio_in, audio_out, map = "last", team, team_name,
-                              team_token;
+                              team_token, team_invite, team_trust;
   std::map<std::string, AccessRole> client_roles;
   bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
   bool overlay_dots = false, overlay_axes = false, overlay_status = false;
@@ -94,7 +94,12 @@ const std::vector<Setting>& Settings() {
       {"team.join", "--team", &Raw::team,
        "HOST:PORT of another wearer's server: maps find each other, marks are shown in both"},
       {"team.name", nullptr, &Raw::team_name, "how others see this one; empty: the machine's name"},
-      {"team.token", nullptr, &Raw::team_token, "an invite's token, where the other asks for one"},
+      {"team.trust", "--team-trust", &Raw::team_trust,
+       "PEM file: the root of that server's certificate, as `saccade trust --from` fetches it"},
+      {"team.invite", "--team-invite", &Raw::team_invite,
+       "a link or ID.SECRET of its `saccade invite --role pilot`; redeemed once, the token is "
+       "kept"},
+      {"team.token", nullptr, &Raw::team_token, "what that invite was redeemed for, if it was"},
       {"overlay.dots", nullptr, &Raw::overlay_dots,
        "the tracker's features in the augmented view, which is the wearer's"},
       {"overlay.axes", nullptr, &Raw::overlay_axes, "the world's axes in it"},
@@ -327,10 +332,19 @@ absl::Status CheckTeam(const Raw& raw, ServerConfig& config) {
   absl::StatusOr<Address> address = Address::Parse(raw.team, "--team");
   if (!address.ok()) return address.status();
   if (address->port == 0) return Bad("--team: needs the other server's port");
-  if (!address->loopback() && !config.insecure) {
+  config.team_trust = raw.team_trust;
+  const std::string::size_type behind = raw.team_invite.find("#invite=");
+  config.team_invite =
+      behind == std::string::npos ? raw.team_invite : raw.team_invite.substr(behind + 8);
+  if (!config.team_trust.empty() && !std::filesystem::is_regular_file(config.team_trust)) {
+    return Bad(absl::StrCat("--team-trust ", raw.team_trust,
+                            ": no such file; fetch it with `saccade trust --from HOST:HTTP_PORT "
+                            "--out root.pem`"));
+  }
+  if (!address->loopback() && config.team_trust.empty() && !config.insecure) {
     return Bad(
-        "--team: the way to another machine is not encrypted yet: say --insecure, or take a "
-        "tunnel that ends on loopback");
+        "--team: another machine speaks TLS: give --team-trust root.pem (`saccade trust --from "
+        "HOST:HTTP_PORT --out root.pem`), or --insecure for a plain one");
   }
   config.team = *address;
   return absl::OkStatus();

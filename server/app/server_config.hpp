@@ -53,6 +53,8 @@ struct ServerConfig {
   std::string map = "last";           // last, new, none, or an id
   std::optional<Address> team;        // another wearer's server, to join
   std::string team_name, team_token;  // [team]: how others see this one; what the other asks for
+  std::string team_invite;            // "ID.SECRET"
+  std::filesystem::path team_trust;   // PEM of the other's root; empty: plain
   std::string audio_in, audio_out;    // ALSA's names; empty: no voice of the wearer's here
   // Only in the file: reasons to change them are rare.
   int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size

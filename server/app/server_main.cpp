@@ -224,6 +224,8 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
       [&engine](std::chrono::milliseconds limit) { return (*engine)->FlushStore(limit); });
   hub.Connect(engine->get());
   const std::unique_ptr<TeamRunner> team = MakeTeam(config, **engine);
+  absl::StatusOr<std::optional<TeamLinkOptions>> to_other = LinkOf(config);
+  if (!to_other.ok()) return to_other.status();
   RpcServerOptions rpc_options;
   rpc_options.host = config.grpc.host;
   rpc_options.port = config.grpc.port;
@@ -275,7 +277,8 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
     voice = *std::move(opened);
   }
   (*engine)->Start();
-  std::unique_ptr<TeamLink> link = LinkOf(config, *team);
+  std::unique_ptr<TeamLink> link;
+  if (*to_other) link = std::make_unique<TeamLink>(**std::move(to_other), *team);
   shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());
   shutdown.Wait(config.run_for_s);

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "saccade/v1/access.grpc.pb.h"
 #include "saccade/v1/team.grpc.pb.h"
 #include "server/rpc/team_messages.hpp"
 #include "shared/io/log.hpp"
@@ -50,6 +51,7 @@ class TeamLink::Impl {
   Impl(TeamLinkOptions options, TeamPort& team)
       : options_(std::move(options)),
         team_(team),
+        token_(options_.token),
         thread_([this](const std::stop_token& stop) { Run(stop); }) {}
   ~Impl() {
     thread_.request_stop();
@@ -75,16 +77,40 @@ class TeamLink::Impl {
     }
   }
 
+  /// Makes a token of the invite, where there is none yet.
+  grpc::Status Enter(const std::shared_ptr<grpc::Channel>& channel) {
+    if (!token_.empty() || options_.invite.empty()) return grpc::Status::OK;
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kAnswer);
+    v1::RedeemRequest request;
+    request.set_invite(options_.invite);
+    request.set_display_name(options_.name);
+    v1::RedeemResponse response;
+    const grpc::Status redeemed =
+        v1::AccessService::NewStub(channel)->Redeem(&context, request, &response);
+    if (!redeemed.ok()) return redeemed;
+    token_ = response.token();
+    options_.keep_token(token_);
+    return grpc::Status::OK;
+  }
+
   /// One connection, until it ends.
   grpc::Status Connect(const std::stop_token& stop) {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    const std::shared_ptr<grpc::Channel> channel =
-        grpc::CreateCustomChannel(options_.address, grpc::InsecureChannelCredentials(), arguments);
+    grpc::SslCredentialsOptions tls;
+    tls.pem_root_certs = options_.root_pem;
+    const std::shared_ptr<grpc::Channel> channel = grpc::CreateCustomChannel(
+        options_.address,
+        options_.root_pem.empty() ? grpc::InsecureChannelCredentials() : grpc::SslCredentials(tls),
+        arguments);
     if (!channel->WaitForConnected(std::chrono::system_clock::now() + kAgain)) {
-      return {grpc::StatusCode::UNAVAILABLE, "no answer"};
+      return {grpc::StatusCode::UNAVAILABLE,
+              options_.root_pem.empty() ? "no answer; one that speaks TLS needs --team-trust"
+                                        : "no answer, or not the certificate of --team-trust"};
     }
+    if (const grpc::Status entered = Enter(channel); !entered.ok()) return entered;
     const auto stub = v1::TeamService::NewStub(channel);
     grpc::ClientContext context;
     Authorise(context);
@@ -136,8 +162,8 @@ class TeamLink::Impl {
   }
 
   void Authorise(grpc::ClientContext& context) const {
-    if (!options_.token.empty()) {
-      context.AddMetadata("authorization", absl::StrCat("Bearer ", options_.token));
+    if (!token_.empty()) {
+      context.AddMetadata("authorization", absl::StrCat("Bearer ", token_));
     }
   }
 
@@ -154,6 +180,7 @@ class TeamLink::Impl {
 
   const TeamLinkOptions options_;
   TeamPort& team_;
+  std::string token_;  // link's thread, but in Authorise of Tell: set before that begins
   std::mutex mutex_;
   grpc::ClientContext* following_ = nullptr;
   bool cancelled_ = false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -8,12 +9,17 @@
 namespace saccade {
 
 struct TeamLinkOptions {
-  std::string address;  // HOST:PORT of the other server
-  std::string token;    // where it needs one; empty: none
+  std::string address;   // HOST:PORT of the other server
+  std::string root_pem;  // of its authority; empty: plain
+  std::string token;     // where it needs one; empty: none, or by `invite`
+  std::string invite;    // "ID.SECRET", redeemed once where there is no token; empty: none
+  std::string name;      // who asks to be let in
+  /// Keeps the token that the invite gave, for the next start.
+  std::function<void(const std::string& token)> keep_token = [](const std::string& /*token*/) {};
 };
 
-/// The way to another server (--team): follows it, and tells it what the own port tells. Plain
-/// gRPC. Where it is not there, or gone, the link tries again every second; what was told meanwhile
+/// The way to another server (--team): follows it, and tells it what the own port tells. Where it
+/// is not there, or gone, the link tries again every second; what was told meanwhile
 /// is told then. Threads of its own; nobody waits for it.
 class TeamLink {
  public:

@@ -65,7 +65,7 @@ class Wearer {
   Engine& engine() { return *engine_; }
   int frames() const { return frames_; }
   void Join(const Wearer& other) {
-    link_ = std::make_unique<TeamLink>(TeamLinkOptions{other.address(), ""}, *team_);
+    link_ = std::make_unique<TeamLink>(TeamLinkOptions{.address = other.address()}, *team_);
   }
   void Leave() { link_.reset(); }
 
