@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "server/pipeline/stop_watch.hpp"
+#include "server/pipeline/frame_cost.hpp"
 
 namespace saccade {
 namespace {
@@ -38,14 +38,14 @@ void SurfaceMap::Add(const Frame& frame, const KeyframePlaces& places) {
       std::find_if(places.keyframes.rbegin(), places.keyframes.rend(),
                    [&](const KeyframePlace& each) { return each.frame == frame.id; });
   if (place == places.keyframes.rend() || !frame.camera || kept_.contains(place->id)) return;
-  StopWatch watch;
+  const double begin_ms = ThreadCpuMs();
   if (static_cast<int>(kept_.size()) >= options_.max_keyframes) DropOldest();
   Kept& kept = kept_[place->id];
   kept.place = *place;
   kept.picture = rectifier_.Rectify(frame);
   for (auto& [id, other] : kept_) other.tried = false;
   ++cost_.keyframes;
-  cost_.picture_ms += watch.Lap_ms();
+  cost_.picture_ms += ThreadCpuMs() - begin_ms;
 }
 
 void SurfaceMap::ForgetFusion() {

@@ -18,7 +18,7 @@ struct SurfaceCost {
   int keyframes = 0;  // whose pictures were taken
   int depths = 0;     // swept, again too
   int fused = 0;      // into the surface, again too
-  double picture_ms = 0, depth_ms = 0, confirm_ms = 0, fuse_ms = 0, mesh_ms = 0;  // sums
+  double picture_ms = 0, depth_ms = 0, confirm_ms = 0, fuse_ms = 0, mesh_ms = 0;  // of processor
   double known_share = 0;      // sum over depths, of their pixels
   double confirmed_share = 0;  // sum over those fused
 };
@@ -91,7 +91,8 @@ class SurfaceMap {
   float LengthFactor(const Kept& kept) const;
   bool SweptElsewhere(const Kept& kept) const;
   bool ConfirmNext();
-  bool FollowNext();
+  bool FollowMoved();
+  bool SweepAgain();
   bool SweepNext();
   bool Sweep(std::int64_t id, Kept& kept);
   void Confirm(std::int64_t id, Kept& kept);

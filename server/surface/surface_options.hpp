@@ -41,7 +41,7 @@ struct SurfaceOptions {
   double truncation_share = 0.02;   // ...or so much of the depth, if that is more
   std::size_t max_blocks = 30'000;  // of 8^3 voxels, 4 KB each: 120 MB
   double least_weight = 1.0;        // of a voxel, in looks from a near keyframe
-  double moved_voxels = 0.5;        // at the distance: a keyframe's depth is fused anew
+  double moved_share = 0.006;       // of the distance: then a keyframe's depth is fused anew
 
   /// InvalidArgument names the field.
   absl::Status Validate() const;

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/pipeline/stop_watch.hpp"
+#include "server/pipeline/frame_cost.hpp"
 #include "server/surface/surface_map.hpp"
 #include "server/surface/view_choice.hpp"
 
@@ -61,12 +61,12 @@ std::vector<std::int64_t> SurfaceMap::ViewsOf(std::int64_t id, const Kept& kept)
 
 bool SurfaceMap::Work() {
   if (ConfirmNext()) return true;
-  StopWatch watch;
+  const double begin_ms = ThreadCpuMs();
   if (fusion_ && fusion_->Work()) {
-    cost_.mesh_ms += watch.Lap_ms();
+    cost_.mesh_ms += ThreadCpuMs() - begin_ms;
     return true;
   }
-  return FollowNext() || SweepNext();
+  return FollowMoved() || SweepNext() || SweepAgain();
 }
 
 bool SurfaceMap::ConfirmNext() {
@@ -87,18 +87,24 @@ bool SurfaceMap::Moved(const Kept& kept) const {
                        kept.place.distance_m * RotationAngle(then, now);
   const double stretched =
       kept.place.distance_m * std::abs(LengthFactor(kept) / kept.fused->length_factor - 1.0f);
-  return moved + stretched > options_.moved_voxels * fusion_->voxels().voxel();
+  return moved + stretched > options_.moved_share * kept.place.distance_m;
 }
 
-bool SurfaceMap::FollowNext() {
+/// All at once: blocks that several of them show are made anew once.
+bool SurfaceMap::FollowMoved() {
+  bool any = false;
   for (auto& [id, kept] : kept_) {
-    if (!kept.depth) continue;
-    if (SweptElsewhere(kept) && Sweep(id, kept)) return true;
     if (!Moved(kept)) continue;
     Fuse(id, kept, kept.fused->depth);
-    return true;
+    any = true;
   }
-  return false;
+  return any;
+}
+
+bool SurfaceMap::SweepAgain() {
+  return std::any_of(kept_.begin(), kept_.end(), [this](auto& each) {
+    return each.second.depth && SweptElsewhere(each.second) && Sweep(each.first, each.second);
+  });
 }
 
 bool SurfaceMap::SweepNext() {
@@ -115,7 +121,7 @@ bool SurfaceMap::SweepNext() {
 bool SurfaceMap::Sweep(std::int64_t id, Kept& kept) {
   const std::vector<std::int64_t> chosen = ViewsOf(id, kept);
   if (static_cast<int>(chosen.size()) < options_.fewest_views) return false;
-  StopWatch watch;
+  const double begin_ms = ThreadCpuMs();
   std::vector<SweepView> views;
   kept.swept.clear();
   for (const std::int64_t other : chosen) {
@@ -133,7 +139,7 @@ bool SurfaceMap::Sweep(std::int64_t id, Kept& kept) {
   kept.depth = FindDepth(kept.picture, views, planes, options_);
   ++cost_.depths;
   cost_.known_share += kept.depth->KnownShare();
-  cost_.depth_ms += watch.Lap_ms();
+  cost_.depth_ms += ThreadCpuMs() - begin_ms;
   kept.confirmed_by = 0;
   kept.confirm_due = true;
   for (auto& [other, each] : kept_) {
@@ -146,7 +152,7 @@ bool SurfaceMap::Sweep(std::int64_t id, Kept& kept) {
 }
 
 void SurfaceMap::Confirm(std::int64_t id, Kept& kept) {
-  StopWatch watch;
+  const double begin_ms = ThreadCpuMs();
   std::vector<std::pair<double, OtherDepth>> asked;
   const double distance = kept.place.distance_m;
   for (const auto& [other, each] : kept_) {
@@ -174,12 +180,12 @@ void SurfaceMap::Confirm(std::int64_t id, Kept& kept) {
   for (auto& [away, other] : asked) others.push_back(other);
   const DepthMap confirmed = KeepConfirmed(*kept.depth, LengthFactor(kept), others, options_);
   cost_.confirmed_share += confirmed.KnownShare();
-  cost_.confirm_ms += watch.Lap_ms();
+  cost_.confirm_ms += ThreadCpuMs() - begin_ms;
   Fuse(id, kept, confirmed);
 }
 
 void SurfaceMap::Fuse(std::int64_t id, Kept& kept, const DepthMap& depth) {
-  StopWatch watch;
+  const double begin_ms = ThreadCpuMs();
   if (!fusion_) {
     const double voxel = metric_ ? options_.voxel_m : options_.voxel_share * kept.place.distance_m;
     fusion_ = std::make_unique<SurfaceFusion>(static_cast<float>(voxel), options_);
@@ -194,7 +200,7 @@ void SurfaceMap::Fuse(std::int64_t id, Kept& kept, const DepthMap& depth) {
   kept.fused = view;
   fusion_->Set(id, std::move(view));
   ++cost_.fused;
-  cost_.fuse_ms += watch.Lap_ms();
+  cost_.fuse_ms += ThreadCpuMs() - begin_ms;
 }
 
 }  // namespace saccade

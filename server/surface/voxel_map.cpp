@@ -10,6 +10,7 @@ constexpr float kVoxelScale = 32767.0f;
 constexpr float kVoxelMostWeight = 200.0f * VoxelMap::kUnitWeight;
 constexpr float kLeastLook = 0.25f, kMostLook = 2.0f;  // weight of one look
 constexpr float kColorReach = 1.5f;                    // voxels from the surface
+constexpr float kColorShare = 0.3f;                    // of a look like the others
 constexpr int kGainStride = 4;                         // pixels of the view that are asked
 constexpr std::size_t kGainFewest = 60;
 
@@ -30,6 +31,19 @@ VoxelMap::Key KeyOf(const Eigen::Vector3f& point, float size) {
 
 float Luma(const std::array<std::uint8_t, 3>& bgr) {
   return 0.114f * bgr[0] + 0.587f * bgr[1] + 0.299f * bgr[2];
+}
+
+/// The colour of who was nearest, evened over those that were as near: a mean over all would blur.
+void Paint(const cv::Vec3b& seen, float gain, float look, VoxelMap::Voxel& voxel) {
+  const auto weight = static_cast<std::uint8_t>(60.0f * look * look + 1.0f);
+  if (10 * weight < 7 * voxel.color_weight) return;
+  const float share = 10 * weight > 15 * voxel.color_weight ? 1.0f : kColorShare;
+  for (int c = 0; c < 3; ++c) {
+    const float value = std::min(255.0f, static_cast<float>(seen[c]) * gain);
+    const float before = voxel.color_bgr[c];
+    voxel.color_bgr[c] = static_cast<std::uint8_t>(before + share * (value - before) + 0.5f);
+  }
+  voxel.color_weight = std::max(voxel.color_weight, weight);
 }
 
 }  // namespace
@@ -130,15 +144,7 @@ void VoxelMap::Fuse(const FusedView& view, const Key& key) {
                                                 sum));
       voxel.weight = static_cast<std::uint16_t>(std::min(sum, kVoxelMostWeight));
       if (std::abs(depth - z) > kColorReach * voxel_) continue;
-      const float paint = 24.0f * look * look;
-      const float painted = std::min<float>(voxel.color_weight, 160.0f);
-      const cv::Vec3b& seen = view.color.at<cv::Vec3b>(v, u);
-      for (int c = 0; c < 3; ++c) {
-        const float value = std::min(255.0f, static_cast<float>(seen[c]) * view.color_gain);
-        voxel.color_bgr[c] = static_cast<std::uint8_t>(
-            (voxel.color_bgr[c] * painted + value * paint) / (painted + paint) + 0.5f);
-      }
-      voxel.color_weight = static_cast<std::uint8_t>(std::min(255.0f, painted + paint));
+      Paint(view.color.at<cv::Vec3b>(v, u), view.color_gain, look, voxel);
     }
   }
 }

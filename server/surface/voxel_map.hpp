@@ -39,7 +39,7 @@ class VoxelMap {
     std::int16_t distance = 0;  // 32767: the truncation
     std::uint16_t weight = 0;   // kUnitWeight: one look from the typical distance
     std::array<std::uint8_t, 3> color_bgr{};
-    std::uint8_t color_weight = 0;
+    std::uint8_t color_weight = 0;  // of the nearest look
   };
   using Key = std::array<std::int32_t, 3>;
   using Block = std::array<Voxel, kVoxels>;  // x fastest
