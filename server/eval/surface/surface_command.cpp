@@ -51,45 +51,6 @@ absl::StatusOr<SurfaceSource> OpenSurfaceSource(const SurfaceArguments& argument
   return opened;
 }
 
-/// The keyframes of a tracker's map with the frames that became them.
-class PlacesOf {
- public:
-  explicit PlacesOf(const Tracker& tracker) : tracker_(tracker) {}
-
-  /// After each tracked frame. The same object while nothing moved; null: there are none.
-  std::shared_ptr<const KeyframePlaces> Read(const MapSnapshot& snapshot) {
-    const KeyframeGraph& graph = tracker_.map().keyframes();
-    const std::optional<Rigid3> newest = graph.Newest();
-    if (!newest) return nullptr;
-    if (places_ && places_->generation != snapshot.map_generation) frames_.clear();
-    if (places_ && places_->generation == snapshot.map_generation && newest_ &&
-        newest_->translation == newest->translation && places_->metric == snapshot.metric) {
-      return places_;
-    }
-    newest_ = newest;
-    auto places = std::make_shared<KeyframePlaces>();
-    places->generation = snapshot.map_generation;
-    places->metric = snapshot.metric;
-    const KeyframeGraph::Outline outline = graph.MakeOutline();
-    const KeyframeId last = outline.keyframes.back().id;
-    if (frames_.empty() || frames_.rbegin()->first < last) frames_[last] = snapshot.frame_id;
-    for (const KeyframeGraph::Outline::Member& each : outline.keyframes) {
-      const auto frame = frames_.find(each.id);
-      if (frame == frames_.end()) continue;
-      places->keyframes.push_back(
-          {each.id, frame->second, each.world_from_camera, each.distance_m});
-    }
-    places_ = std::move(places);
-    return places_;
-  }
-
- private:
-  const Tracker& tracker_;
-  std::map<KeyframeId, FrameId> frames_;
-  std::shared_ptr<const KeyframePlaces> places_;
-  std::optional<Rigid3> newest_;
-};
-
 /// Frames that were kept, for people to compare with.
 using FramesSeen = std::map<FrameId, cv::Mat>;
 
@@ -108,7 +69,6 @@ absl::StatusOr<SurfaceRun> RunSurfaces(const SurfaceArguments& arguments, FrameS
   if (!surfaces.ok()) return surfaces.status();
   SurfaceRun run;
   run.surfaces = *std::move(surfaces);
-  PlacesOf map(**tracker);
   std::optional<Timestamp> begin;
   while (true) {
     absl::StatusOr<std::optional<Frame>> frame = source.Next();
@@ -122,7 +82,7 @@ absl::StatusOr<SurfaceRun> RunSurfaces(const SurfaceArguments& arguments, FrameS
     if (snapshot->status != TrackingStatus::kTracking) continue;
     ++run.tracked;
     run.metric = snapshot->metric;
-    const auto places = map.Read(*snapshot);
+    const auto places = (*tracker)->keyframes();
     if (!places || places->keyframes.empty()) continue;
     if (run.surfaces->Wants((*frame)->id, *places)) {
       Frame seen = **frame;
