@@ -4,18 +4,9 @@
 #include <limits>
 
 #include "server/pipeline/frame_cost.hpp"
+#include "server/surface/view_choice.hpp"
 
 namespace saccade {
-namespace {
-
-double ApartBy(const KeyframePlace& a, const KeyframePlace& b, const SurfaceOptions& options) {
-  const double moved =
-      (a.world_from_camera.translation - b.world_from_camera.translation).norm() / a.distance_m;
-  return moved / options.apart_share +
-         RotationAngle(a.world_from_camera, b.world_from_camera) / options.apart_rad;
-}
-
-}  // namespace
 
 absl::StatusOr<std::unique_ptr<SurfaceMap>> SurfaceMap::Create(const SurfaceOptions& options) {
   if (absl::Status status = options.Validate(); !status.ok()) return status;

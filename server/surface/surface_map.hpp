@@ -86,7 +86,7 @@ class SurfaceMap {
   void ForgetAll();
   void ForgetFusion();
   void Follow(Kept& kept, const std::map<std::int64_t, KeyframePlace>& now) const;
-  bool Moved(const Kept& kept) const;
+  double Moved(const Kept& kept) const;
   std::vector<std::int64_t> ViewsOf(std::int64_t id, const Kept& kept) const;
   float LengthFactor(const Kept& kept) const;
   bool SweptElsewhere(const Kept& kept) const;
@@ -107,6 +107,7 @@ class SurfaceMap {
   std::map<std::int64_t, Kept> kept_;
   std::unique_ptr<SurfaceFusion> fusion_;
   SurfaceCost cost_;
+  int followed_at_ = 0;  // keyframes that had come when moves were last followed
 };
 
 }  // namespace saccade

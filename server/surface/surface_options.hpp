@@ -14,6 +14,7 @@ struct SurfaceOptions {
   // Keyframes and the views that they are compared with.
   double apart_share = 0.04;           // of the distance, or...
   double apart_rad = 0.10;             // ...so much turned: another keyframe
+  double depth_apart = 1.6;            // times that: another depth; between them, views only
   int max_keyframes = 300;             // kept; 0.1 MB each
   int views = 6;                       // compared with each
   int fewest_views = 3;                // else its depth is not sought yet
@@ -41,7 +42,7 @@ struct SurfaceOptions {
   double truncation_share = 0.02;   // ...or so much of the depth, if that is more
   std::size_t max_blocks = 30'000;  // of 8^3 voxels, 4 KB each: 120 MB
   double least_weight = 1.0;        // of a voxel, in looks from a near keyframe
-  double moved_share = 0.006;       // of the distance: then a keyframe's depth is fused anew
+  double moved_share = 0.010;       // of the distance: then a keyframe's depth is fused anew
 
   /// InvalidArgument names the field.
   absl::Status Validate() const;

@@ -9,10 +9,12 @@
 namespace saccade {
 namespace {
 
-constexpr std::size_t kMostAsked = 10;      // keyframes that confirm one
-constexpr double kSweptAgain_px = 0.7;      // of a small picture, that a view has moved
-constexpr double kFarFromAsked = 0.6;       // of the distance
-constexpr int kConfirmedAt[] = {3, 6, 10};  // keyframes asked: then it is done again
+constexpr std::size_t kMostAsked = 10;  // keyframes that confirm one
+constexpr double kSweptAgain_px = 0.7;  // of a small picture, that a view has moved
+constexpr double kFarFromAsked = 0.6;   // of the distance
+constexpr int kFollowEvery = 8;         // keyframes
+constexpr double kFarMoved = 3.0;       // times what is worth following: at once
+constexpr int kConfirmedAt[] = {3, 8};  // keyframes asked: then it is done again
 
 }  // namespace
 
@@ -79,26 +81,31 @@ bool SurfaceMap::ConfirmNext() {
   return false;
 }
 
-bool SurfaceMap::Moved(const Kept& kept) const {
-  if (!kept.fused || !fusion_) return false;
+/// Since its depth was fused; above 1: worth following.
+double SurfaceMap::Moved(const Kept& kept) const {
+  if (!kept.fused || !fusion_) return 0.0;
   const Rigid3& then = kept.fused->world_from_camera;
   const Rigid3& now = kept.place.world_from_camera;
   const double moved = (then.translation - now.translation).norm() +
                        kept.place.distance_m * RotationAngle(then, now);
   const double stretched =
       kept.place.distance_m * std::abs(LengthFactor(kept) / kept.fused->length_factor - 1.0f);
-  return moved + stretched > options_.moved_share * kept.place.distance_m;
+  return (moved + stretched) / (options_.moved_share * kept.place.distance_m);
 }
 
-/// All at once: blocks that several of them show are made anew once.
+/// All at once, and small moves not each time: blocks that several of them show are made anew once.
 bool SurfaceMap::FollowMoved() {
-  bool any = false;
+  const bool due = cost_.keyframes >= followed_at_ + kFollowEvery;
+  const double least = due ? 1.0 : kFarMoved;
+  const bool any = std::any_of(kept_.begin(), kept_.end(),
+                               [&](const auto& each) { return Moved(each.second) > least; });
+  if (!any) return false;
+  followed_at_ = cost_.keyframes;
   for (auto& [id, kept] : kept_) {
-    if (!Moved(kept)) continue;
+    if (Moved(kept) <= 1.0) continue;
     Fuse(id, kept, kept.fused->depth);
-    any = true;
   }
-  return any;
+  return true;
 }
 
 bool SurfaceMap::SweepAgain() {
@@ -113,6 +120,11 @@ bool SurfaceMap::SweepNext() {
     Kept& kept = at->second;
     if (kept.depth || kept.tried || newer < options_.newer_keyframes) continue;
     kept.tried = true;
+    const bool near = std::any_of(kept_.begin(), kept_.end(), [&](const auto& each) {
+      return each.second.depth &&
+             ApartBy(kept.place, each.second.place, options_) < options_.depth_apart;
+    });
+    if (near) continue;
     if (Sweep(at->first, kept)) return true;
   }
   return false;
@@ -144,7 +156,7 @@ bool SurfaceMap::Sweep(std::int64_t id, Kept& kept) {
   kept.confirm_due = true;
   for (auto& [other, each] : kept_) {
     if (other == id || !each.depth || each.confirm_due) continue;
-    if (each.confirmed_by >= kConfirmedAt[2]) continue;
+    if (each.confirmed_by >= kConfirmedAt[1]) continue;
     each.confirm_due = Overlap(kept.place.world_from_camera, each.place.world_from_camera,
                                each.picture.camera, kept.place.distance_m);
   }

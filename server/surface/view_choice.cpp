@@ -19,6 +19,13 @@ struct Rated {
 
 }  // namespace
 
+double ApartBy(const KeyframePlace& a, const KeyframePlace& b, const SurfaceOptions& options) {
+  const double moved =
+      (a.world_from_camera.translation - b.world_from_camera.translation).norm() / a.distance_m;
+  return moved / options.apart_share +
+         RotationAngle(a.world_from_camera, b.world_from_camera) / options.apart_rad;
+}
+
 bool Overlap(const Rigid3& world_from_a, const Rigid3& world_from_b, const Pinhole& b,
              double distance) {
   const Rigid3 b_from_a = world_from_b.Inverse() * world_from_a;

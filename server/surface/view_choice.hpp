@@ -7,6 +7,7 @@
 #include "server/surface/surface_options.hpp"
 #include "server/surface/surface_picture.hpp"
 #include "shared/geometry/rigid3.hpp"
+#include "shared/scene/keyframe_places.hpp"
 
 namespace saccade {
 
@@ -23,6 +24,9 @@ struct ViewCandidate {
 std::vector<std::int64_t> ChooseViews(const Rigid3& world_from_reference, double distance,
                                       std::span<const ViewCandidate> candidates,
                                       const SurfaceOptions& options);
+
+/// Below 1: two keyframes are so near that one of them is enough.
+double ApartBy(const KeyframePlace& a, const KeyframePlace& b, const SurfaceOptions& options);
 
 /// Whether two cameras show the same things, seen from anywhere.
 bool Overlap(const Rigid3& world_from_a, const Rigid3& world_from_b, const Pinhole& b,

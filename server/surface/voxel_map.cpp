@@ -112,6 +112,7 @@ void VoxelMap::Fuse(const FusedView& view, const Key& key) {
   Block& block = *blocks_.at(key);
   const CameraFrame frame(view);
   const Pinhole& camera = view.depth.camera;
+  const auto width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
   const Eigen::Vector3f step = frame.turn.col(0) * voxel_;
   const float* inverse_depths = view.depth.inverse_depth.ptr<float>();
   for (int k = 0; k < kVoxels; k += kSide) {
@@ -123,25 +124,27 @@ void VoxelMap::Fuse(const FusedView& view, const Key& key) {
     for (int i = 0; i < kSide; ++i, point += step) {
       const float z = point.z();
       if (z < voxel_) continue;
-      const int u = static_cast<int>(std::lround(camera.focal_px * point.x() / z + camera.cx));
-      const int v = static_cast<int>(std::lround(camera.focal_px * point.y() / z + camera.cy));
-      if (u < 0 || v < 0 || u >= camera.width || v >= camera.height) continue;
+      const float scale = camera.focal_px / z;
+      const float fu = scale * point.x() + camera.cx + 0.5f;
+      const float fv = scale * point.y() + camera.cy + 0.5f;
+      if (!(fu >= 0.0f && fv >= 0.0f && fu < width && fv < height)) continue;
+      const int u = static_cast<int>(fu), v = static_cast<int>(fv);
       const float inverse = inverse_depths[v * camera.width + u];
       if (inverse <= 0.0f) continue;
       const float depth = view.length_factor / inverse;
       const float truncation = Truncation(depth);
+      if (depth - z < -truncation) continue;
       const float off = (depth - z) / truncation;
-      if (off < -1.0f) continue;
       Voxel& voxel = block[k + i];
       const float look = std::clamp(view.distance / depth, kLeastLook, kMostLook);
       // Behind a surface less is known the deeper it is: thin things have another side.
       const float weight = kUnitWeight * look * (off < 0.0f ? std::max(0.1f, 1.0f + off) : 1.0f);
       const float before = voxel.weight;
       const float sum = before + weight;
-      voxel.distance =
-          static_cast<std::int16_t>(std::lround((static_cast<float>(voxel.distance) * before +
-                                                 kVoxelScale * std::min(1.0f, off) * weight) /
-                                                sum));
+      const float mean = (static_cast<float>(voxel.distance) * before +
+                          kVoxelScale * std::min(1.0f, off) * weight) /
+                         sum;
+      voxel.distance = static_cast<std::int16_t>(mean + std::copysign(0.5f, mean));
       voxel.weight = static_cast<std::uint16_t>(std::min(sum, kVoxelMostWeight));
       if (std::abs(depth - z) > kColorReach * voxel_) continue;
       Paint(view.color.at<cv::Vec3b>(v, u), view.color_gain, look, voxel);
