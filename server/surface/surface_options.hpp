@@ -15,7 +15,7 @@ struct SurfaceOptions {
   double apart_share = 0.04;           // of the distance, or...
   double apart_rad = 0.10;             // ...so much turned: another keyframe
   double depth_apart = 1.6;            // times that: another depth; between them, views only
-  int max_keyframes = 300;             // kept; 0.1 MB each
+  int max_keyframes = 300;             // kept; 0.3 MB each
   int views = 6;                       // compared with each
   int fewest_views = 3;                // else its depth is not sought yet
   int newer_keyframes = 2;             // seen since: views from both sides
