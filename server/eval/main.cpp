@@ -11,6 +11,7 @@
 
 #include "server/eval/commands.hpp"
 #include "server/eval/markers/marker_flags.hpp"
+#include "server/eval/surface/surface_command.hpp"
 #include "server/eval/team/team_command.hpp"
 #include "server/eval/team/team_settings.hpp"
 #include "shared/version/version.hpp"
@@ -370,6 +371,8 @@ int Main(int argc, char** argv) {
   AddTeam(app, team);
   std::filesystem::path figures;
   AddFigures(app, figures);
+  SurfaceArguments surface;
+  AddSurface(app, surface);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -392,6 +395,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("placements")) status = PlacementsCommand(placements);
   if (app.got_subcommand("figures")) status = FiguresCommand(figures);
   if (app.got_subcommand("occlusion")) status = OcclusionCommand(occlusion);
+  if (app.got_subcommand("surface")) status = SurfaceCommand(surface);
   if (app.got_subcommand("team")) status = TeamCommand(team);
   return status.ok() ? 0 : Fail(status);
 }

@@ -120,6 +120,8 @@ class KeyframeGraph {
   /// Changes whenever the keyframe or a point that it saw first does; 0: there is no such keyframe.
   /// So who remembers a large map need not ask for all of it in every frame.
   std::uint64_t Version(KeyframeId id) const;
+  /// Rises whenever any keyframe does.
+  std::uint64_t changes() const { return changes_; }
   /// The filter's last word on a feature that leaves it.
   void SetEstimate(FeatureId id, const GraphEstimate& estimate);
   /// Keyframes by rising id, and how many points tie two of them: born in one, seen from the other.
@@ -156,6 +158,7 @@ class KeyframeGraph {
     GraphEstimate estimate;
     std::vector<KeyframeId> seen_from;  // rising
   };
+  const std::map<KeyframeId, Keyframe>& all() const { return keyframes_; }
   /// All of it, for a file.
   struct Contents {
     std::map<KeyframeId, Keyframe> keyframes;

@@ -29,7 +29,8 @@ void Tracker::Wake(const CameraModel& camera) {
   }
 }
 
-bool Tracker::KeepForAdjustment(const CameraModel& camera) {
+bool Tracker::KeepForAdjustment(const Frame& frame) {
+  const CameraModel& camera = *frame.camera;
   const double distance_m = 1.0 / std::max(1e-6, depth_.inverse_range);
   if (!options_.adjust || !map_.HasNews(filter_, distance_m)) return false;
   const double focal = 0.5 * (camera.intrinsics().fx + camera.intrinsics().fy);
@@ -45,6 +46,7 @@ bool Tracker::KeepForAdjustment(const CameraModel& camera) {
     sightings.push_back(sighting);
   }
   map_.AddKeyframe(filter_, distance_m, options_.pixel_sigma_px / focal, sightings);
+  keyframe_frames_[map_.keyframes().all().rbegin()->first] = frame.id;
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include "server/scene/sight.hpp"
 #include "server/tracker/carried_squares.hpp"
 #include "server/tracker/lens_state.hpp"
+#include "shared/scene/keyframe_places.hpp"
 #include "shared/scene/map_snapshot.hpp"
 #include "shared/scene/scene_light.hpp"
 
@@ -49,6 +50,9 @@ class FrameTracker {
   virtual SceneLight light() const { return {}; }
   /// The lens of the frame tracked last, where it is learnt; null: that of the frames.
   virtual std::shared_ptr<const CameraModel> lens() const { return nullptr; }
+  /// Where the map's keyframes are now; the same object while none has moved, come or gone. Null:
+  /// there are none, or the tracker has no such map.
+  virtual std::shared_ptr<const KeyframePlaces> keyframes() const { return nullptr; }
   /// How far that is; nothing: it is not learnt.
   virtual std::optional<LensState> lens_state() const { return std::nullopt; }
 };

@@ -33,6 +33,26 @@ Difficulties Tracker::SeeDifficulties() const {
   return seen;
 }
 
+void Tracker::PublishKeyframes() {
+  const KeyframeGraph& graph = map_.keyframes();
+  if (keyframe_places_ && keyframe_places_->generation == generation_ &&
+      keyframe_places_->metric == metric_ && keyframe_changes_ == graph.changes()) {
+    return;
+  }
+  keyframe_changes_ = graph.changes();
+  std::erase_if(keyframe_frames_,
+                [&](const auto& each) { return !graph.all().contains(each.first); });
+  auto places = std::make_shared<KeyframePlaces>();
+  places->generation = generation_;
+  places->metric = metric_;
+  places->keyframes.reserve(keyframe_frames_.size());
+  for (const auto& [id, frame] : keyframe_frames_) {
+    const KeyframeGraph::Keyframe& keyframe = graph.all().at(id);
+    places->keyframes.push_back({id, frame, keyframe.world_from_camera, keyframe.distance_m});
+  }
+  keyframe_places_ = std::move(places);
+}
+
 std::shared_ptr<const MapSnapshot> Tracker::Publish(const Frame& frame, const StageTimes& times) {
   map_.LocateAtRest();
   auto snapshot = std::make_shared<MapSnapshot>();
@@ -88,6 +108,7 @@ std::shared_ptr<const MapSnapshot> Tracker::Publish(const Frame& frame, const St
     }
   }
   PublishAtRest(*snapshot);
+  PublishKeyframes();
   return snapshot;
 }
 

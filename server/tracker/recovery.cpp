@@ -154,7 +154,7 @@ absl::StatusOr<FeatureId> Tracker::SeedFeature(const Frame& clicked_frame,
     id = births_.Plant(last_frame_, *seen, depth, clone.id(), matches_.motion, matcher_,
                        *front_end_, filter_, map_.in_use());
   }
-  KeepForAdjustment(camera);
+  KeepForAdjustment(last_frame_);
   if (!id) return absl::NotFoundError("feature: no texture to track at this pixel");
   map_.in_use().Find(*id)->seeded = true;
   return *id;

@@ -48,7 +48,7 @@ void Tracker::Begin(const Frame& frame) {
   matches_.attempted += born;
   matches_.accepted += born;
   if (held_) {
-    KeepForAdjustment(*frame.camera);
+    KeepForAdjustment(frame);
   } else {
     finder_.Record(frame.capture_time_ns, *frame.camera, filter_, map_.in_use(), matches_);
   }

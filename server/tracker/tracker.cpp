@@ -94,6 +94,7 @@ void Tracker::Reset() {
   if (learner_) learner_->Reset();
   matches_ = FrameMatches();
   before_relocalisation_.reset();
+  keyframe_frames_.clear();
   started_ = metric_ = held_ = has_frame_ = false;
   if (squares_) squares_->Reset();
   if (guide_) guide_->Reset();
@@ -333,7 +334,7 @@ void Tracker::Manage(const Frame& frame) {
   if (!telling || covered) return;
   if (const auto guess = Births::GuessDepth(filter_, matches_)) depth_ = *guess;
   Grow(frame, /*everywhere=*/false);
-  if (KeepForAdjustment(*frame.camera)) {
+  if (KeepForAdjustment(frame)) {
     refiner_.Start(frames_, frame.capture_time_ns, map_, filter_);
   }
   KeepKeyframe(frame);

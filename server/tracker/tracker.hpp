@@ -3,6 +3,7 @@
 #include <absl/status/statusor.h>
 
 #include <Eigen/Dense>
+#include <map>
 #include <memory>
 #include <random>
 
@@ -70,6 +71,8 @@ class Tracker final : public FrameTracker {
   std::optional<LensState> lens_state() const override {
     return learner_ ? std::optional(learner_->state()) : std::nullopt;
   }
+
+  std::shared_ptr<const KeyframePlaces> keyframes() const override { return keyframe_places_; }
 
   /// Returns when nothing is being computed on other threads (for a process that forks).
   void WaitForBackground() const {
@@ -140,8 +143,9 @@ class Tracker final : public FrameTracker {
   /// Of where a keyframe was, when its landmarks are woken.
   Matrix6d WakeCovariance(double distance_m) const;
   /// Keeps this frame as a keyframe of the map, if it has news; true if it had.
-  bool KeepForAdjustment(const CameraModel& camera);
+  bool KeepForAdjustment(const Frame& frame);
   void PublishAtRest(MapSnapshot& snapshot) const;
+  void PublishKeyframes();
   OldLandmarks OldOnes() const;
   void CloseLoops(const Frame& frame);
   void MoveMap(const MapCorrection& correction);
@@ -230,6 +234,9 @@ class Tracker final : public FrameTracker {
   double nis_ = 0.0;
   StageTimes times_;
   std::optional<Map::Checkpoint> before_relocalisation_;
+  std::map<KeyframeId, FrameId> keyframe_frames_;  // of this run
+  std::shared_ptr<const KeyframePlaces> keyframe_places_;
+  std::uint64_t keyframe_changes_ = 0;    // of the graph, that they are of
   std::unique_ptr<InertialGuide> guide_;  // null: no inertial unit, or none is wanted
   double blind_s_ = 0.0;                  // since something was seen
   std::unique_ptr<SquareLandmarks> squares_;

@@ -15,10 +15,10 @@ using std::string_view;
 
 // Listed along the data flow: a folder includes only itself and those before it.
 constexpr auto kServerOrder = std::to_array<string_view>(
-    {"pipeline", "mount",     "gl",      "capture", "sim",   "scene",    "features",
-     "markers",  "calibrate", "filter",  "map",     "team",  "tracker",  "anchors",
-     "gaze",     "wearable",  "overlay", "encode",  "store", "identity", "rpc",
-     "wear",     "audio",     "gateway", "eval",    "app"});
+    {"pipeline", "mount",     "gl",       "capture", "sim",     "scene", "features",
+     "markers",  "calibrate", "filter",   "map",     "surface", "team",  "tracker",
+     "anchors",  "gaze",      "wearable", "overlay", "encode",  "store", "identity",
+     "rpc",      "wear",      "audio",    "gateway", "eval",    "app"});
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "talk", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder =
