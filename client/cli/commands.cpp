@@ -229,6 +229,8 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kMapsSave:
     case Command::kMapsLoad:
     case Command::kMapsDelete:
+    case Command::kMapsExport:
+    case Command::kMapsImport:
       return RunMaps(options, connection);
     case Command::kSceneList:
     case Command::kSceneAdd:

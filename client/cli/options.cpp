@@ -105,6 +105,8 @@ Command CommandOf(const CLI::App& app) {
       {"maps save", Command::kMapsSave},
       {"maps load", Command::kMapsLoad},
       {"maps delete", Command::kMapsDelete},
+      {"maps export", Command::kMapsExport},
+      {"maps import", Command::kMapsImport},
       {"scene list", Command::kSceneList},
       {"scene add", Command::kSceneAdd},
       {"scene place", Command::kScenePlace},
@@ -116,7 +118,8 @@ Command CommandOf(const CLI::App& app) {
       {"print", Command::kPrintMarkers}};
   const CLI::App* chosen = app.get_subcommands().front();
   const std::string& family = chosen->get_name();
-  if (family == "scene" || family == "maps") {  // their commands are called as others are
+  if (family == "scene" || family == "maps" ||
+      family == "recording") {  // their commands are called as others are
     return commands.at(absl::StrCat(family, " ", chosen->get_subcommands().front()->get_name()));
   }
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();

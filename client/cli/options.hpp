@@ -52,6 +52,8 @@ enum class Command {
   kMapsSave,
   kMapsLoad,
   kMapsDelete,
+  kMapsExport,
+  kMapsImport,
   kSceneList,
   kSceneAdd,
   kScenePlace,
@@ -105,7 +107,7 @@ struct Options {
   struct Markers {
     std::string family, ids, size, paper;  // print; as typed
   } markers;
-  std::string map_name;
+  std::string map_name, map_file;  // maps save; maps import: file to read
   struct Scene {
     std::string model, shape, material, name, points;  // as typed
     std::string size, at, push, gravity;               // X,Y,Z; empty: not given

@@ -68,6 +68,8 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"MapService/Save", kPilot},
     {"MapService/Load", kPilot},
     {"MapService/Delete", kPilot},
+    {"MapService/ExportFile", kPilot},
+    {"MapService/ImportFile", kPilot},
 
     {"GazeService/GetState", kViewer},
     {"GazeService/GetMountCalibration", kViewer},

@@ -88,6 +88,8 @@ const std::map<std::string, Least>& Promised() {
       {"MapService/Save", kPilot},
       {"MapService/Load", kPilot},
       {"MapService/Delete", kPilot},
+      {"MapService/ExportFile", kPilot},
+      {"MapService/ImportFile", kPilot},
       {"GazeService/GetState", kViewer},
       {"GazeService/GetMountCalibration", kViewer},
       {"GazeService/AcquireLease", kPilot},
