@@ -12,6 +12,7 @@
 
 #include "client/cli/access_commands.hpp"
 #include "client/cli/map_commands.hpp"
+#include "client/cli/recording_commands.hpp"
 #include "client/cli/scene_commands.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
@@ -225,6 +226,10 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kMessages:
     case Command::kPausePicture:
       return RunTalk(options);
+    case Command::kRecordingStart:
+    case Command::kRecordingStop:
+    case Command::kRecordingStatus:
+      return RunRecording(options, connection);
     case Command::kMapsList:
     case Command::kMapsSave:
     case Command::kMapsLoad:
@@ -241,6 +246,7 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kCameras:
     case Command::kRecord:
     case Command::kCalibrateCamera:
+    case Command::kReplay:
     case Command::kPrintMarkers:
       break;  // asks no server
   }

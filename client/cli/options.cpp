@@ -14,6 +14,7 @@
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/record_command.hpp"
+#include "client/cli/recording_commands.hpp"
 #include "client/cli/scene_commands.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
@@ -107,6 +108,10 @@ Command CommandOf(const CLI::App& app) {
       {"maps delete", Command::kMapsDelete},
       {"maps export", Command::kMapsExport},
       {"maps import", Command::kMapsImport},
+      {"replay", Command::kReplay},
+      {"recording start", Command::kRecordingStart},
+      {"recording stop", Command::kRecordingStop},
+      {"recording status", Command::kRecordingStatus},
       {"scene list", Command::kSceneList},
       {"scene add", Command::kSceneAdd},
       {"scene place", Command::kScenePlace},
@@ -184,6 +189,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddAccess(app, options);
   AddTalk(app, options);
   AddMaps(app, options);
+  AddRecording(app, options);
   AddScene(app, options);
   AddMachine(app, options);
 

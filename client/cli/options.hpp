@@ -54,6 +54,10 @@ enum class Command {
   kMapsDelete,
   kMapsExport,
   kMapsImport,
+  kReplay,
+  kRecordingStart,
+  kRecordingStop,
+  kRecordingStatus,
   kSceneList,
   kSceneAdd,
   kScenePlace,
@@ -107,6 +111,9 @@ struct Options {
   struct Markers {
     std::string family, ids, size, paper;  // print; as typed
   } markers;
+  struct {
+    std::string file, form, at;  // as typed
+  } replay;
   std::string map_name, map_file;  // maps save; maps import: file to read
   struct Scene {
     std::string model, shape, material, name, points;  // as typed

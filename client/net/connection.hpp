@@ -126,6 +126,11 @@ class Connection {
   /// PermissionDenied: only the wearer does that.
   absl::StatusOr<PicturePause> PausePicture(bool paused);
 
+  absl::StatusOr<Recording> GetRecording();
+  /// PermissionDenied: only the wearer does that.
+  absl::StatusOr<Recording> StartRecording();
+  absl::StatusOr<Recording> StopRecording();
+
   GazeAnswer GetGaze();
   /// Asks for the lease, or renews it: at least every 200 ms, or it is gone.
   absl::StatusOr<Lease> AcquireLease(const std::string& lease_id);

@@ -43,6 +43,15 @@ struct PicturePause {
   std::int64_t since_unix_ns = 0;
 };
 
+/// What the server records, or recorded last.
+struct Recording {
+  bool on = false;
+  std::string file;                // on the server's disk; empty: none since its start
+  std::int64_t since_unix_ns = 0;  // 0: never
+  std::uint64_t bytes = 0, messages = 0, events_lost = 0;
+  std::string problem;  // why it stopped by itself; empty: it did not
+};
+
 /// One line of the conversation.
 struct ChatMessage {
   std::uint64_t number = 0;  // from 1, rises while the server runs

@@ -23,6 +23,7 @@
 #include "server/calibrate/calibration_desk.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/pipeline/descriptors.hpp"
+#include "server/record/recorder.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
 #include "server/store/annotation_store.hpp"
@@ -229,6 +230,15 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   rpc_options.port = config.grpc.port;
   rpc_options.calibration = calibration.get();
   rpc_options.team = team.get();
+  constexpr std::uint64_t kMegabyte = std::uint64_t{1} << 20;
+  Recorder recorder(
+      hub, {.directory = config.record_dir,
+            .file_bytes = static_cast<std::uint64_t>(config.record_file_mb) * kMegabyte,
+            .file_length = std::chrono::seconds(config.record_file_s),
+            .keep_free_bytes = static_cast<std::uint64_t>(config.record_keep_free_mb) * kMegabyte,
+            .version = Version(),
+            .source = NameForReports(config.source)});
+  rpc_options.recording = &recorder;
   ApplyLimits(config, rpc_options);
   shutdown.SetPhase("making certificates");
   const absl::StatusOr<std::unique_ptr<FrontDoor>> door = FrontDoor::Open(config);
@@ -275,6 +285,11 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
     voice = *std::move(opened);
   }
   (*engine)->Start();
+  if (config.record) {
+    recorder.StartRecording([](const absl::StatusOr<RecordingState>& started) {
+      if (!started.ok()) Log(absl::StrCat("recording: ", started.status().message()));
+    });
+  }
   std::unique_ptr<TeamLink> link = LinkOf(config, *team);
   shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());
@@ -282,6 +297,7 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   voice.reset();
   link.reset();
   team->Stop();
+  recorder.Stop();
   // Streams end first, then browsers, then the threads that answer commands, then calls.
   hub.CloseAll(absl::UnavailableError("the server is shutting down"));
   (*gateway)->Stop();

@@ -61,6 +61,10 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"TeamService/Follow", kViewer},
     {"TeamService/Tell", kPilot},  // another wearer's server: its marks come in
 
+    {"RecordingService/GetRecording", kViewer},
+    {"RecordingService/StartRecording", kWearer},  // whose eyes it is
+    {"RecordingService/StopRecording", kWearer},
+
     {"MapService/Get", kViewer},
     {"MapService/Export", kViewer},
     {"MapService/List", kViewer},
