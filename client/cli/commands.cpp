@@ -226,6 +226,12 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kMessages:
     case Command::kPausePicture:
       return RunTalk(options);
+    case Command::kPlaybackStatus:
+    case Command::kPlaybackPlay:
+    case Command::kPlaybackPause:
+    case Command::kPlaybackSeek:
+    case Command::kPlaybackSpeed:
+      return RunPlayback(options, connection);
     case Command::kRecordingStart:
     case Command::kRecordingStop:
     case Command::kRecordingStatus:

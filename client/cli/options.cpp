@@ -112,6 +112,11 @@ Command CommandOf(const CLI::App& app) {
       {"recording start", Command::kRecordingStart},
       {"recording stop", Command::kRecordingStop},
       {"recording status", Command::kRecordingStatus},
+      {"playback status", Command::kPlaybackStatus},
+      {"playback play", Command::kPlaybackPlay},
+      {"playback pause", Command::kPlaybackPause},
+      {"playback seek", Command::kPlaybackSeek},
+      {"playback speed", Command::kPlaybackSpeed},
       {"scene list", Command::kSceneList},
       {"scene add", Command::kSceneAdd},
       {"scene place", Command::kScenePlace},
@@ -123,8 +128,8 @@ Command CommandOf(const CLI::App& app) {
       {"print", Command::kPrintMarkers}};
   const CLI::App* chosen = app.get_subcommands().front();
   const std::string& family = chosen->get_name();
-  if (family == "scene" || family == "maps" ||
-      family == "recording") {  // their commands are called as others are
+  if (family == "scene" || family == "maps" || family == "recording" ||
+      family == "playback") {  // their commands are called as others are
     return commands.at(absl::StrCat(family, " ", chosen->get_subcommands().front()->get_name()));
   }
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();

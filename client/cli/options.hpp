@@ -58,6 +58,11 @@ enum class Command {
   kRecordingStart,
   kRecordingStop,
   kRecordingStatus,
+  kPlaybackStatus,
+  kPlaybackPlay,
+  kPlaybackPause,
+  kPlaybackSeek,
+  kPlaybackSpeed,
   kSceneList,
   kSceneAdd,
   kScenePlace,
@@ -113,6 +118,7 @@ struct Options {
   } markers;
   struct {
     std::string file, form, at;  // as typed
+    double number = 0;           // playback seek, speed
   } replay;
   std::string map_name, map_file;  // maps save; maps import: file to read
   struct Scene {

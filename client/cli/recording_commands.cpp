@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "client/cli/option_values.hpp"
 #include "client/cli/text.hpp"
 #include "client/cli/waiting_commands.hpp"
 
@@ -30,13 +31,27 @@ std::string RecordingText(const net::Recording& recording) {
 
 }  // namespace
 
-void AddRecording(CLI::App& app, Options& /*options*/) {
+void AddRecording(CLI::App& app, Options& options) {
   CLI::App* recording = app.add_subcommand(
       "recording", "Record on the server, as MCAP: video, poses, map, marks, conversation");
   recording->require_subcommand(1);
   recording->add_subcommand("start", "Begin; whoever watches sees it in the list of people");
   recording->add_subcommand("stop", "End, and say where the file is");
   recording->add_subcommand("status", "How it goes");
+  CLI::App* playback = app.add_subcommand(
+      "playback", "Of a server that plays a recording (--source replay:FILE), for all who watch");
+  playback->require_subcommand(1);
+  playback->add_subcommand("status", "Where it is");
+  playback->add_subcommand("play", "Go on; from the end: from the beginning");
+  playback->add_subcommand("pause", "Stand still");
+  playback->add_subcommand("seek", "Go to a moment")
+      ->add_option("seconds", options.replay.number, "From its beginning")
+      ->check(Number(0.0, 1e9))
+      ->required();
+  playback->add_subcommand("speed", "Faster or slower")
+      ->add_option("factor", options.replay.number, "1: as it was")
+      ->check(Number(0.1, 16.0))
+      ->required();
 }
 
 absl::Status RunRecording(const Options& options, net::Connection& connection) {
@@ -56,6 +71,33 @@ absl::Status RunRecording(const Options& options, net::Connection& connection) {
               << "\n";
   } else {
     std::cout << RecordingText(*recording);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RunPlayback(const Options& options, net::Connection& connection) {
+  net::ReplayChange change;
+  if (options.command == Command::kPlaybackPlay) change.playing = true;
+  if (options.command == Command::kPlaybackPause) change.playing = false;
+  if (options.command == Command::kPlaybackSeek) change.position_s = options.replay.number;
+  if (options.command == Command::kPlaybackSpeed) change.speed = options.replay.number;
+  const absl::StatusOr<net::Replay> replay = options.command == Command::kPlaybackStatus
+                                                 ? connection.GetReplay()
+                                                 : connection.ChangeReplay(change);
+  if (!replay.ok()) return replay.status();
+  if (options.json) {
+    std::cout << Dump({{"file", replay->file},
+                       {"playing", replay->playing},
+                       {"position_s", replay->position_s},
+                       {"length_s", replay->length_s},
+                       {"speed", replay->speed}})
+              << "\n";
+  } else {
+    std::cout << absl::StrFormat("%s: %.1f of %.1f s, %s", replay->file, replay->position_s,
+                                 replay->length_s, replay->playing ? "playing" : "standing still")
+              << (replay->speed == 1.0 ? ""
+                                       : absl::StrFormat(", %.2g times as fast", replay->speed))
+              << "\n";
   }
   return absl::OkStatus();
 }

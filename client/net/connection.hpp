@@ -131,6 +131,9 @@ class Connection {
   absl::StatusOr<Recording> StartRecording();
   absl::StatusOr<Recording> StopRecording();
 
+  absl::StatusOr<Replay> GetReplay();
+  absl::StatusOr<Replay> ChangeReplay(const ReplayChange& change);
+
   GazeAnswer GetGaze();
   /// Asks for the lease, or renews it: at least every 200 ms, or it is gone.
   absl::StatusOr<Lease> AcquireLease(const std::string& lease_id);

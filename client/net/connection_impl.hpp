@@ -18,6 +18,7 @@
 #include "saccade/v1/map.grpc.pb.h"
 #include "saccade/v1/pointer.grpc.pb.h"
 #include "saccade/v1/recording.grpc.pb.h"
+#include "saccade/v1/replay.grpc.pb.h"
 #include "saccade/v1/scene.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 #include "saccade/v1/talk.grpc.pb.h"
@@ -40,7 +41,8 @@ class Connection::Impl {
         pointer_(v1::PointerService::NewStub(channel_)),
         scene_(v1::SceneService::NewStub(channel_)),
         talk_(v1::TalkService::NewStub(channel_)),
-        recording_(v1::RecordingService::NewStub(channel_)) {}
+        recording_(v1::RecordingService::NewStub(channel_)),
+        replay_(v1::ReplayService::NewStub(channel_)) {}
 
   // One unary call with this connection's deadline.
   template <typename Stub, typename Request, typename Response>
@@ -133,6 +135,7 @@ class Connection::Impl {
   const std::unique_ptr<v1::SceneService::Stub> scene_;
   const std::unique_ptr<v1::TalkService::Stub> talk_;
   const std::unique_ptr<v1::RecordingService::Stub> recording_;
+  const std::unique_ptr<v1::ReplayService::Stub> replay_;
 };
 
 }  // namespace saccade::net

@@ -52,6 +52,18 @@ struct Recording {
   std::string problem;  // why it stopped by itself; empty: it did not
 };
 
+/// Where the replay of a recording is.
+struct Replay {
+  std::string file;
+  bool playing = false;
+  double position_s = 0, length_s = 0, speed = 1;
+};
+/// What is to be different; nothing: stays.
+struct ReplayChange {
+  std::optional<bool> playing;
+  std::optional<double> position_s, speed;
+};
+
 /// One line of the conversation.
 struct ChatMessage {
   std::uint64_t number = 0;  // from 1, rises while the server runs

@@ -57,7 +57,7 @@ const std::vector<Setting>& Settings() {
   static const std::vector<Setting> settings = {
       {"source", "--source", &Raw::source,
        "sim:desk[?...] | dataset:DIR[?fps=N] | v4l2:DEVICE[?...] | file:VIDEO[?...] | rtsp://... | "
-       "phone:[?...]"},
+       "phone:[?...] | replay:FILE.mcap"},
       {"mount", "--mount", &Raw::mount, MountDrivers().Usage()},
       {nullptr, "--config", &Raw::config, "TOML file; flags win over it"},
       {"data_dir", "--data-dir", &Raw::data_dir, "annotations are kept here"},

@@ -65,6 +65,9 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"RecordingService/StartRecording", kWearer},  // whose eyes it is
     {"RecordingService/StopRecording", kWearer},
 
+    {"ReplayService/GetReplay", kViewer},
+    {"ReplayService/ChangeReplay", kPilot},  // for all who watch
+
     {"MapService/Get", kViewer},
     {"MapService/Export", kViewer},
     {"MapService/List", kViewer},

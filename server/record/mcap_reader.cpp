@@ -15,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr Timestamp kLongest_ns = Timestamp{2} * 86'400 * 1'000'000'000;
 constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;  // of a chunk, or the summary
 /// Takes numbers and texts off the front; after the first that is not there ok() is false.
 class Fields {
@@ -69,6 +70,11 @@ absl::StatusOr<std::unique_ptr<McapReader>> McapReader::Open(const fs::path& fil
     const bool first = &chunk == &reader->chunks_.front();
     reader->first_ns_ = first ? chunk.first_ns : std::min(reader->first_ns_, chunk.first_ns);
     reader->last_ns_ = first ? chunk.last_ns : std::max(reader->last_ns_, chunk.last_ns);
+  }
+  // Nobody steps through years of nothing.
+  if (reader->first_ns_ < 0 || reader->last_ns_ < reader->first_ns_ ||
+      reader->last_ns_ - reader->first_ns_ > kLongest_ns) {
+    return reader->Damaged("its times are not those of one recording");
   }
   return reader;
 }

@@ -138,7 +138,10 @@ absl::Status Recorder::CheckRoom() const {
 
 absl::Status Recorder::Begin() {
   std::error_code error;
-  if (fs::create_directories(options_.directory, error); error) {
+  if (fs::create_directories(options_.directory, error)) {  // its owner's alone
+    fs::permissions(options_.directory, fs::perms::owner_all, error);
+  }
+  if (error) {
     return absl::UnavailableError(absl::StrCat(options_.directory.string(), ": ", error.message(),
                                                "; choose another --record"));
   }

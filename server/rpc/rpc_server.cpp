@@ -17,6 +17,7 @@
 #include "server/rpc/pointer_board.hpp"
 #include "server/rpc/pointer_service.hpp"
 #include "server/rpc/recording_service.hpp"
+#include "server/rpc/replay_service.hpp"
 #include "server/rpc/scene_service.hpp"
 #include "server/rpc/session_service.hpp"
 #include "server/rpc/talk_service.hpp"
@@ -108,7 +109,8 @@ class RpcServer::Impl {
         calibration_service_(options.calibration, gate_),
         talk_service_(backend, hub, gate_, options.limits.voice_packets),
         team_service_(options.team, gate_),
-        recording_service_(options.recording, gate_) {
+        recording_service_(options.recording, gate_),
+        replay_service_(options.replay, gate_) {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
       pointers_.EndAccess(ids);
@@ -161,6 +163,7 @@ class RpcServer::Impl {
     builder.RegisterService(&talk_service_);
     builder.RegisterService(&team_service_);
     builder.RegisterService(&recording_service_);
+    builder.RegisterService(&replay_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
     listener_ = *std::move(listener);
@@ -212,6 +215,7 @@ class RpcServer::Impl {
   TalkService talk_service_;
   TeamService team_service_;
   RecordingService recording_service_;
+  ReplayService replay_service_;
   std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
   std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs
   std::unique_ptr<grpc::Server> server_;

@@ -17,6 +17,7 @@
 #include "saccade/v1/map.pb.h"
 #include "saccade/v1/pointer.pb.h"
 #include "saccade/v1/recording.pb.h"
+#include "saccade/v1/replay.pb.h"
 #include "saccade/v1/scene.pb.h"
 #include "saccade/v1/session.pb.h"
 #include "saccade/v1/team.pb.h"
@@ -85,6 +86,8 @@ const std::map<std::string, Least>& Promised() {
       {"RecordingService/GetRecording", kViewer},
       {"RecordingService/StartRecording", kWearer},
       {"RecordingService/StopRecording", kWearer},
+      {"ReplayService/GetReplay", kViewer},
+      {"ReplayService/ChangeReplay", kPilot},
       {"MapService/Get", kViewer},
       {"MapService/Export", kViewer},
       {"MapService/List", kViewer},
@@ -118,7 +121,7 @@ std::vector<const MethodDescriptor*> EveryMethod() {
         v1::GetGazeStateRequest::descriptor(), v1::PointRequest::descriptor(),
         v1::WearerHello::descriptor(), v1::ListSceneRequest::descriptor(),
         v1::GetCalibrationRequest::descriptor(), v1::GetTeamRequest::descriptor(),
-        v1::GetRecordingRequest::descriptor()}) {
+        v1::GetRecordingRequest::descriptor(), v1::GetReplayRequest::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

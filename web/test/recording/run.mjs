@@ -12,7 +12,8 @@ import { createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { AnnotationService, AnnotationShape } from '../../src/gen/saccade/v1/annotation_pb.js';
 import { RecordingService } from '../../src/gen/saccade/v1/recording_pb.js';
-import { SessionService } from '../../src/gen/saccade/v1/session_pb.js';
+import { ReplayService } from '../../src/gen/saccade/v1/replay_pb.js';
+import { SessionService, Topic } from '../../src/gen/saccade/v1/session_pb.js';
 import { TalkService } from '../../src/gen/saccade/v1/talk_pb.js';
 import { startServer } from '../browser/server.mjs';
 
@@ -36,11 +37,11 @@ function check(name, ok, figures) {
 const folder = mkdtempSync(join(tmpdir(), 'saccade-recording-'));
 let servers = 0;
 /** A server on the simulator, with a file of configuration, and the command line's way to it. */
-async function start(config, args = []) {
+async function start(config, args = [], source = 'sim:desk?width=320&height=240') {
   const file = join(folder, `${++servers}.toml`);
   writeFileSync(file, config);
   const server = await startServer(options.server, [
-    ...['--source', 'sim:desk?width=320&height=240', '--config', file],
+    ...['--source', source, '--config', file],
     ...['--data-dir', join(folder, `data${servers}`), ...args],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);
@@ -207,7 +208,9 @@ async function whole() {
       }
     }
   }
-  await exported(files.at(-1), await readWhole(files.at(-1)));
+  const last = await readWhole(files.at(-1));
+  await exported(files.at(-1), last);
+  await replayed(files.at(-1), last);
   check(
     'pictures are whole and in order over all files',
     rises(frames) && placedInAll > 10,
@@ -261,6 +264,112 @@ async function exported(file, read) {
       Math.abs(vertices - points) <= 0.6 * points,
     `${poses.length} poses, ${vertices} features where the last cloud has ${points}; ${tum.text.trim()}`,
   );
+}
+
+/** What somebody hears who watches. */
+async function listen(server) {
+  const session = server.client(SessionService);
+  const { sessionId } = await session.join({ displayName: 'Bo' });
+  const topics = [Topic.POSE, Topic.VIDEO, Topic.MAP, Topic.ANNOTATION];
+  const heard = { pictures: [], features: new Set(), texts: '' };
+  const stop = new AbortController();
+  const read = async () => {
+    for await (const { sequence, event } of session.subscribe(
+      { sessionId, topics },
+      { signal: stop.signal },
+    )) {
+      session.acknowledge({ sessionId, sequence }).catch(() => undefined);
+      if (event.case === 'accessUnit')
+        heard.pictures.push({ ...event.value, ms: performance.now() });
+      if (event.case === 'map') for (const { id } of event.value.upserted) heard.features.add(id);
+      if (event.case === 'annotation') {
+        for (const { text } of event.value.upserted) heard.texts += text;
+      }
+    }
+  };
+  heard.done = read().catch(() => undefined);
+  heard.stop = () => stop.abort();
+  return heard;
+}
+
+/** The recording in the place of a camera: seen as it was, paused, sought in, faster. */
+async function replayed(file, recorded) {
+  const server = await start('[record]\nkeep_free_mb = 1\n', [], `replay:${file}`);
+  try {
+    const heard = await listen(server);
+    const replay = server.client(ReplayService);
+    await sleep(500);
+    await replay.changeReplay({ positionS: 0 }); // who comes in between waits for the next key frame
+    await sleep(1500);
+    await replay.changeReplay({ playing: false });
+    await sleep(300);
+    const still = heard.pictures.length;
+    await sleep(500);
+    const same = new Set(recorded.of('/camera/video').map(({ value }) => value.data.join()));
+    check(
+      'what was recorded is seen again, to the byte, and stands still when asked to',
+      still > 5 &&
+        heard.pictures.length === still &&
+        heard.pictures[0].keyFrame &&
+        heard.pictures.every(({ data }) => same.has(data.join())) &&
+        heard.features.size > 10 &&
+        heard.texts.includes('valve'),
+      `${still} pictures, ${heard.features.size} features, marks: ${heard.texts}`,
+    );
+    const { replay: whole } = await replay.getReplay({});
+    const took = [];
+    for (const share of [0.7, 0.1, 0.5]) {
+      const before = heard.pictures.length;
+      const begin = performance.now();
+      await replay.changeReplay({ positionS: share * whole.lengthS });
+      while (heard.pictures.length === before && performance.now() - begin < 5000) await sleep(1);
+      took.push(performance.now() - begin);
+    }
+    check(
+      'sought while it stands still, the picture is there in 300 ms',
+      took.every((ms) => ms < 300),
+      took.map((ms) => `${ms.toFixed(0)} ms`).join(', '),
+    );
+    const ids = heard.pictures.map(({ frameId }) => frameId);
+    check('frame ids rise, wherever it goes', rises(ids), `${ids.length} pictures`);
+    await server.cli('playback', 'seek', '0');
+    await server.cli('playback', 'speed', '4');
+    const fast = await server.cli('playback', 'play');
+    const begin = performance.now();
+    let at = JSON.parse(fast.out || '{}');
+    while (at.playing && performance.now() - begin < 10_000) {
+      await sleep(50);
+      at = JSON.parse((await server.cli('playback', 'status')).out);
+    }
+    const seconds = (performance.now() - begin) / 1000;
+    check(
+      'four times as fast it ends in a quarter of the time, and stands at its end',
+      seconds < 0.25 * whole.lengthS + 1 &&
+        seconds > 0.2 * whole.lengthS - 0.5 &&
+        Math.abs(at.position_s - whole.lengthS) < 0.2,
+      `${whole.lengthS.toFixed(1)} s in ${seconds.toFixed(1)} s`,
+    );
+    const { sessionId } = await server.client(SessionService).join({ displayName: 'Cy' });
+    const refused = await server
+      .client(AnnotationService)
+      .create({
+        sessionId,
+        draft: {
+          shape: AnnotationShape.NOTE,
+          text: 'late',
+          target: { target: { case: 'pointInWorldM', value: { x: 0.1, y: 0, z: 0 } } },
+        },
+      })
+      .then(
+        () => '',
+        (error) => error.rawMessage,
+      );
+    check('nothing of it is changed', /recording/.test(refused), refused);
+    heard.stop();
+    await heard.done;
+  } finally {
+    await server.stop();
+  }
 }
 
 async function fullDisk() {

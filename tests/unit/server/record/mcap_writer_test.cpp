@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "server/record/mcap_reader.hpp"
 #include "server/record/recorded_stream.hpp"
 
 namespace saccade::mcap_writer_test {
@@ -157,6 +158,60 @@ TEST_F(McapWriterTest, AFullDiskIsSaidWithTheRemedy) {
   EXPECT_THAT(std::string(full.message()), HasSubstr("make room"));
   EXPECT_EQ(after, full);
   EXPECT_EQ(closed, full);
+}
+
+TEST_F(McapWriterTest, WhatIsCutOffIsReadToItsLastWholeChunkAndDamageIsSaid) {
+  {
+    const auto writer = Make();
+    const auto channel = writer->AddChannel(writer->AddSchema("a.B", "protobuf", "x"), "/b", "pb");
+    for (int k = 0; k < 12; ++k) {
+      ASSERT_TRUE(writer->Write(channel, 100 + k, std::to_string(k)).ok());
+      if (k % 3 == 2) {
+        ASSERT_TRUE(writer->Flush().ok());
+      }
+    }
+  }
+  const std::string whole = Read();
+  std::vector<std::string> read;
+  const auto read_all = [&](const std::string& bytes) -> absl::Status {
+    std::ofstream(file_, std::ios::binary) << bytes;
+    read.clear();
+    const auto reader = McapReader::Open(file_);
+    if (!reader.ok()) return reader.status();
+    return (*reader)->Read(
+        (*reader)->first_ns(), (*reader)->last_ns(),
+        [&](const McapReader::Message& message) { read.emplace_back(message.data); });
+  };
+  ASSERT_TRUE(read_all(whole).ok());
+  ASSERT_EQ(read.size(), 12U);
+  EXPECT_EQ(read[11], "11");
+  std::size_t most = 0;
+  for (std::size_t size = kMagic; size < whole.size(); size += 3) {
+    ASSERT_TRUE(read_all(whole.substr(0, size)).ok()) << size;
+    EXPECT_EQ(read.size() % 3, 0U) << "whole chunks alone";
+    EXPECT_GE(read.size(), most);
+    most = std::max(most, read.size());
+  }
+  EXPECT_EQ(most, 12U);
+  int refused = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 3) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x41);
+    if (!read_all(damaged).ok()) ++refused;
+    for (const std::string& each : read) {
+      EXPECT_TRUE(!each.empty() && each.size() <= 2 && each < "9z") << at;
+    }
+  }
+  EXPECT_GT(refused, 40);
+  // Between two times: by the index.
+  ASSERT_TRUE(read_all(whole).ok());
+  const auto reader = McapReader::Open(file_);
+  std::vector<Timestamp> times;
+  ASSERT_TRUE(
+      (*reader)
+          ->Read(104, 106, [&](const McapReader::Message& m) { times.push_back(m.time_ns); })
+          .ok());
+  EXPECT_THAT(times, ElementsAre(104, 105, 106));
 }
 
 TEST(RecordQueue, TakesNoMoreThanItMay) {
