@@ -103,6 +103,18 @@ absl::Status ReplayedState::TakePose(const McapReader::Message& message, EventSi
   return absl::OkStatus();
 }
 
+void ReplayedState::TellAgain(EventSink& sink) {
+  if (!newest_) return;
+  auto snapshot = std::make_shared<MapSnapshot>(*newest_->snapshot);
+  // Ids of what follows are counted from here.
+  first_id_ += 1;
+  snapshot->frame_id = last_id_ += 1;
+  snapshot->capture_time_ns = now_ns_;
+  newest_->stages.captured_ns = newest_->stages.received_ns = newest_->stages.tracked_ns = now_ns_;
+  newest_->snapshot = std::move(snapshot);
+  sink.OnTracked(*newest_);
+}
+
 absl::Status ReplayedState::TakePicture(const McapReader::Message& message) {
   picture_.emplace();
   if (absl::Status parsed = ParseInto(message, *picture_); !parsed.ok()) return parsed;

@@ -26,6 +26,9 @@ class ReplayedState {
   /// is not as this version writes it.
   absl::Status Take(const McapReader::Message& message, EventSink* sink);
 
+  /// Tells the newest pose once more, as of now: nobody is to think that the camera is away.
+  void TellAgain(EventSink& sink);
+
   /// After the first picture.
   std::shared_ptr<const CameraModel> camera() const { return camera_; }
   std::shared_ptr<const AnnotationList> annotations() const { return annotations_; }

@@ -16,6 +16,7 @@ constexpr Timestamp kAhead_ns = 500'000'000;  // is read at a time
 // Every two seconds there is a key frame, every ten the whole state; more where pictures stayed
 // away.
 constexpr Timestamp kKeyFrameBack_ns = 5'000'000'000, kStateBack_ns = 12'000'000'000;
+constexpr std::chrono::milliseconds kTellAgain{500};
 constexpr double kSlowest = 0.1, kFastest = 16.0;
 constexpr char kPicture[] = "/saccade/picture", kVideo[] = "/camera/video",
                kPose[] = "/saccade/pose";
@@ -181,13 +182,16 @@ absl::Status Replayer::Fill() {
   return absl::OkStatus();
 }
 
+void Replayer::SetTime(Clock::time_point now) {
+  state_.SetTime(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(now.time_since_epoch()).count());
+}
+
 void Replayer::TellNext() {
   const Kept next = std::move(next_.front());
   next_.pop_front();
   position_ns_ = std::max(position_ns_, next.time_ns);
-  state_.SetTime(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(DueAt(next.time_ns).time_since_epoch())
-          .count());
+  SetTime(DueAt(next.time_ns));
   absl::Status told = state_.Take({next.topic, next.time_ns, next.data}, sink_);
   if (told.ok()) told = Fill();
   if (told.ok()) return;
@@ -226,20 +230,26 @@ void Replayer::Run(std::stop_token stop) {
   Seek(mcap_->first_ns()).IgnoreError();  // it was read by Open
   while (!stop.stop_requested()) {
     std::deque<Order> orders;
+    bool still = false;  // and so long that it is told again
     {
       std::unique_lock lock(mutex_);
       const auto ordered = [this] { return !orders_.empty(); };
       if (playing_ && !next_.empty()) {
         changed_.wait_until(lock, stop, DueAt(next_.front().time_ns), ordered);
       } else {
-        changed_.wait(lock, stop, ordered);
+        still = !changed_.wait_for(lock, stop, kTellAgain, ordered);
       }
       orders.swap(orders_);
     }
     for (const Order& order : orders) Carry(order);
-    if (stop.stop_requested() || !playing_) continue;
+    if (stop.stop_requested()) continue;
+    if (still) {
+      SetTime(Clock::now());
+      state_.TellAgain(*sink_);
+    }
+    if (!playing_) continue;
     while (!next_.empty() && DueAt(next_.front().time_ns) <= Clock::now()) TellNext();
-    if (next_.empty() && !std::exchange(ended_, true)) sink_->OnEndOfSource(state_.pictures());
+    ended_ = next_.empty();
     Publish();
   }
   const std::lock_guard lock(mutex_);

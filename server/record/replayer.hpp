@@ -59,6 +59,7 @@ class Replayer final : public ReplayPort {
   absl::StatusOr<std::vector<Kept>> Between(Timestamp from_ns, Timestamp until_ns);
   absl::Status Fill();
   void TellNext();
+  void SetTime(Clock::time_point now);
   /// When what was recorded at `time_ns` is due.
   Clock::time_point DueAt(Timestamp time_ns) const;
   void Anchor();

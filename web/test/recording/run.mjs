@@ -271,7 +271,7 @@ async function listen(server) {
   const session = server.client(SessionService);
   const { sessionId } = await session.join({ displayName: 'Bo' });
   const topics = [Topic.POSE, Topic.VIDEO, Topic.MAP, Topic.ANNOTATION];
-  const heard = { pictures: [], features: new Set(), texts: '' };
+  const heard = { poses: 0, pictures: [], features: new Set(), texts: '' };
   const stop = new AbortController();
   const read = async () => {
     for await (const { sequence, event } of session.subscribe(
@@ -281,6 +281,7 @@ async function listen(server) {
       session.acknowledge({ sessionId, sequence }).catch(() => undefined);
       if (event.case === 'accessUnit')
         heard.pictures.push({ ...event.value, ms: performance.now() });
+      if (event.case === 'pose') ++heard.poses;
       if (event.case === 'map') for (const { id } of event.value.upserted) heard.features.add(id);
       if (event.case === 'annotation') {
         for (const { text } of event.value.upserted) heard.texts += text;
@@ -304,12 +305,14 @@ async function replayed(file, recorded) {
     await replay.changeReplay({ playing: false });
     await sleep(300);
     const still = heard.pictures.length;
-    await sleep(500);
+    const poses = heard.poses;
+    await sleep(1200);
     const same = new Set(recorded.of('/camera/video').map(({ value }) => value.data.join()));
     check(
       'what was recorded is seen again, to the byte, and stands still when asked to',
       still > 5 &&
         heard.pictures.length === still &&
+        heard.poses > poses && // nobody is to think that the camera is away
         heard.pictures[0].keyFrame &&
         heard.pictures.every(({ data }) => same.has(data.join())) &&
         heard.features.size > 10 &&
