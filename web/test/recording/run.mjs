@@ -2,12 +2,9 @@
 // usage: run.mjs --server PATH --cli PATH
 import { execFile } from 'node:child_process';
 import { existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { open } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
-import { createFileRegistry, fromBinary } from '@bufbuild/protobuf';
-import { FileDescriptorSetSchema } from '@bufbuild/protobuf/wkt';
 import { createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { AnnotationService, AnnotationShape } from '../../src/gen/saccade/v1/annotation_pb.js';
@@ -25,7 +22,7 @@ for (const needed of ['@mcap/core', '@connectrpc/connect-web']) {
   console.log(`skipped: no ${needed}; run npm ci in web/`);
   process.exit(77);
 }
-const { McapIndexedReader, McapStreamReader } = await import('@mcap/core');
+const { readCut, readWhole } = await import('./read.mjs');
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 let failures = 0;
@@ -55,81 +52,6 @@ async function start(config, args = [], source = 'sim:desk?width=320&height=240'
   const transport = createGrpcWebTransport({ baseUrl: server.http });
   server.client = (service) => createClient(service, transport);
   return server;
-}
-
-/** Messages of one file, decoded by the schemas that it brings along. */
-class Decoded {
-  byTopic = new Map();
-  lastNs = 0n;
-  #types = new Map();
-  add(channel, schema, message) {
-    if (!this.#types.has(channel.id)) {
-      const files = createFileRegistry(fromBinary(FileDescriptorSetSchema, schema.data));
-      this.#types.set(channel.id, files.getMessage(schema.name));
-    }
-    const value = fromBinary(this.#types.get(channel.id), message.data);
-    if (!this.byTopic.has(channel.topic)) this.byTopic.set(channel.topic, []);
-    this.byTopic.get(channel.topic).push({ logNs: message.logTime, value });
-    if (message.logTime > this.lastNs) this.lastNs = message.logTime;
-  }
-  of(topic) {
-    return this.byTopic.get(topic) ?? [];
-  }
-}
-
-async function readWhole(file) {
-  const handle = await open(file);
-  const { size } = await handle.stat();
-  const readable = {
-    size: async () => BigInt(size),
-    read: async (offset, length) => {
-      const buffer = new Uint8Array(Number(length));
-      await handle.read(buffer, 0, Number(length), Number(offset));
-      return buffer;
-    },
-  };
-  const reader = await McapIndexedReader.Initialize({ readable });
-  const decoded = new Decoded();
-  let messages = 0n;
-  for await (const message of reader.readMessages({ validateCrcs: true })) {
-    const channel = reader.channelsById.get(message.channelId);
-    decoded.add(channel, reader.schemasById.get(channel.schemaId), message);
-    ++messages;
-  }
-  decoded.counted = messages === reader.statistics.messageCount;
-  decoded.metadata = [];
-  for await (const each of reader.readMetadata()) decoded.metadata.push(each);
-  // By the index: what is read of the last second begins there.
-  const seekNs = reader.statistics.messageEndTime - 1_000_000_000n;
-  const begin = performance.now();
-  for await (const message of reader.readMessages({
-    startTime: seekNs,
-    topics: ['/camera/video'],
-  })) {
-    decoded.soughtNs = message.logTime - seekNs;
-    break;
-  }
-  decoded.soughtMs = performance.now() - begin;
-  await handle.close();
-  return decoded;
-}
-
-/** As far as it goes. */
-function readCut(file) {
-  const reader = new McapStreamReader({ validateCrcs: true });
-  const decoded = new Decoded();
-  const channels = new Map();
-  const schemas = new Map();
-  reader.append(readFileSync(file));
-  for (let record = reader.nextRecord(); record; record = reader.nextRecord()) {
-    if (record.type === 'Schema') schemas.set(record.id, record);
-    if (record.type === 'Channel') channels.set(record.id, record);
-    if (record.type !== 'Message') continue;
-    const channel = channels.get(record.channelId);
-    decoded.add(channel, schemas.get(channel.schemaId), record);
-  }
-  decoded.ended = reader.done();
-  return decoded;
 }
 
 const rises = (numbers) => numbers.every((each, i) => i === 0 || each > numbers[i - 1]);
