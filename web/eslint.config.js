@@ -67,7 +67,7 @@ export default tseslint.config(
     },
   })),
   {
-    files: ['scripts/**/*.mjs', 'test/browser/**/*.mjs', '*.js', '*.ts'],
+    files: ['scripts/**/*.mjs', 'test/browser/**/*.mjs', 'test/recording/**/*.mjs', '*.js', '*.ts'],
     languageOptions: {
       globals: {
         console: 'readonly',

@@ -12,6 +12,7 @@
 
 #include "client/cli/access_commands.hpp"
 #include "client/cli/map_commands.hpp"
+#include "client/cli/recording_commands.hpp"
 #include "client/cli/scene_commands.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
@@ -225,10 +226,22 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kMessages:
     case Command::kPausePicture:
       return RunTalk(options);
+    case Command::kPlaybackStatus:
+    case Command::kPlaybackPlay:
+    case Command::kPlaybackPause:
+    case Command::kPlaybackSeek:
+    case Command::kPlaybackSpeed:
+      return RunPlayback(options, connection);
+    case Command::kRecordingStart:
+    case Command::kRecordingStop:
+    case Command::kRecordingStatus:
+      return RunRecording(options, connection);
     case Command::kMapsList:
     case Command::kMapsSave:
     case Command::kMapsLoad:
     case Command::kMapsDelete:
+    case Command::kMapsExport:
+    case Command::kMapsImport:
       return RunMaps(options, connection);
     case Command::kSceneList:
     case Command::kSceneAdd:
@@ -239,6 +252,7 @@ absl::Status Run(const Options& options, net::Connection& connection) {
     case Command::kCameras:
     case Command::kRecord:
     case Command::kCalibrateCamera:
+    case Command::kReplay:
     case Command::kPrintMarkers:
       break;  // asks no server
   }

@@ -63,6 +63,7 @@ absl::Status RunCommand(cli::Options& options) {
   if (options.command == cli::Command::kRecord) return cli::RunRecord(options);
   if (options.command == cli::Command::kCalibrateCamera) return cli::RunCalibrateCamera(options);
   if (options.command == cli::Command::kPrintMarkers) return cli::RunPrintMarkers(options);
+  if (options.command == cli::Command::kReplay) return cli::RunReplay(options);
   return RunWithSession(options);
 }
 

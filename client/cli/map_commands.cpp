@@ -12,9 +12,12 @@
 #include "client/cli/commands.hpp"
 #include "client/cli/text.hpp"
 #include "client/cli/waiting_commands.hpp"
+#include "shared/io/regular_file.hpp"
 
 namespace saccade::cli {
 namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{256} << 20;  // what a server takes
 
 /// By the beginning of its id, or by a name that only one has.
 absl::StatusOr<std::string> MapId(const std::string& which, net::Connection& connection) {
@@ -76,6 +79,36 @@ absl::Status RunSave(const Options& options, net::Connection& connection) {
   return absl::OkStatus();
 }
 
+absl::Status RunExport(const Options& options, net::Connection& connection) {
+  const absl::StatusOr<std::string> id = MapId(options.id, connection);
+  if (!id.ok()) return id.status();
+  const absl::StatusOr<std::string> file = connection.ExportMapFile(*id);
+  if (!file.ok()) return file.status();
+  if (absl::Status written = WriteFile(options.out, *file); !written.ok()) return written;
+  if (options.json) {
+    std::cout << Dump({{"id", *id}, {"out", options.out}, {"bytes", file->size()}}) << "\n";
+  } else {
+    std::cout << options.out << ": the map " << *id << ", "
+              << absl::StrFormat("%.1f MB", 1e-6 * static_cast<double>(file->size())) << "\n";
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RunImport(const Options& options, net::Connection& connection) {
+  const absl::StatusOr<std::string> file = ReadRegularFile(options.map_file, kMostBytes, "a map");
+  if (!file.ok()) return file.status();
+  const absl::StatusOr<net::StoredMapFacts> map = connection.ImportMapFile(*file);
+  if (!map.ok()) return map.status();
+  if (options.json) {
+    std::cout << Dump({{"id", map->id}, {"name", map->name}, {"landmarks", map->landmarks}})
+              << "\n";
+  } else {
+    std::cout << "took in the map " << map->id << (map->name.empty() ? "" : " '" + map->name + "'")
+              << "; `saccade maps load` looks for it\n";
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 void AddMaps(CLI::App& app, Options& options) {
@@ -87,6 +120,12 @@ void AddMaps(CLI::App& app, Options& options) {
   CLI::App* load = maps->add_subcommand(
       "load", "Look for another map in the pictures that come; this one is kept");
   load->add_option("id", options.id, "Its id, the beginning of it, or its name")->required();
+  CLI::App* out = maps->add_subcommand("export", "Write the file of one, to keep it elsewhere");
+  out->add_option("id", options.id, "Its id, the beginning of it, or its name")->required();
+  out->add_option("--out", options.out, "The file to write: bench.map")->required();
+  maps->add_subcommand("import", "Take such a file in; it keeps its id")
+      ->add_option("file", options.map_file, "Written by `saccade maps export`, or a copy of one")
+      ->required();
   CLI::App* remove = maps->add_subcommand("delete", "Remove one from the disk");
   remove->add_option("id", options.id, "Its id, the beginning of it, or its name")->required();
 }
@@ -94,6 +133,8 @@ void AddMaps(CLI::App& app, Options& options) {
 absl::Status RunMaps(const Options& options, net::Connection& connection) {
   if (options.command == Command::kMapsList) return RunList(options, connection);
   if (options.command == Command::kMapsSave) return RunSave(options, connection);
+  if (options.command == Command::kMapsExport) return RunExport(options, connection);
+  if (options.command == Command::kMapsImport) return RunImport(options, connection);
   const absl::StatusOr<std::string> id = MapId(options.id, connection);
   if (!id.ok()) return id.status();
   const bool load = options.command == Command::kMapsLoad;

@@ -11,7 +11,7 @@ namespace saccade::cli {
 
 void AddMaps(CLI::App& app, Options& options);
 
-/// `saccade maps list`, and save, load, delete.
+/// `saccade maps list`, and save, load, delete, export, import.
 absl::Status RunMaps(const Options& options, net::Connection& connection);
 
 }  // namespace saccade::cli

@@ -14,6 +14,7 @@
 #include "client/cli/option_values.hpp"
 #include "client/cli/problem.hpp"
 #include "client/cli/record_command.hpp"
+#include "client/cli/recording_commands.hpp"
 #include "client/cli/scene_commands.hpp"
 #include "client/cli/talk_commands.hpp"
 #include "client/cli/text.hpp"
@@ -105,6 +106,17 @@ Command CommandOf(const CLI::App& app) {
       {"maps save", Command::kMapsSave},
       {"maps load", Command::kMapsLoad},
       {"maps delete", Command::kMapsDelete},
+      {"maps export", Command::kMapsExport},
+      {"maps import", Command::kMapsImport},
+      {"replay", Command::kReplay},
+      {"recording start", Command::kRecordingStart},
+      {"recording stop", Command::kRecordingStop},
+      {"recording status", Command::kRecordingStatus},
+      {"playback status", Command::kPlaybackStatus},
+      {"playback play", Command::kPlaybackPlay},
+      {"playback pause", Command::kPlaybackPause},
+      {"playback seek", Command::kPlaybackSeek},
+      {"playback speed", Command::kPlaybackSpeed},
       {"scene list", Command::kSceneList},
       {"scene add", Command::kSceneAdd},
       {"scene place", Command::kScenePlace},
@@ -116,7 +128,8 @@ Command CommandOf(const CLI::App& app) {
       {"print", Command::kPrintMarkers}};
   const CLI::App* chosen = app.get_subcommands().front();
   const std::string& family = chosen->get_name();
-  if (family == "scene" || family == "maps") {  // their commands are called as others are
+  if (family == "scene" || family == "maps" || family == "recording" ||
+      family == "playback") {  // their commands are called as others are
     return commands.at(absl::StrCat(family, " ", chosen->get_subcommands().front()->get_name()));
   }
   if (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
@@ -181,6 +194,7 @@ ParseResult ParseCommandLine(int argc, const char* const* argv) {
   AddAccess(app, options);
   AddTalk(app, options);
   AddMaps(app, options);
+  AddRecording(app, options);
   AddScene(app, options);
   AddMachine(app, options);
 

@@ -52,6 +52,17 @@ enum class Command {
   kMapsSave,
   kMapsLoad,
   kMapsDelete,
+  kMapsExport,
+  kMapsImport,
+  kReplay,
+  kRecordingStart,
+  kRecordingStop,
+  kRecordingStatus,
+  kPlaybackStatus,
+  kPlaybackPlay,
+  kPlaybackPause,
+  kPlaybackSeek,
+  kPlaybackSpeed,
   kSceneList,
   kSceneAdd,
   kScenePlace,
@@ -105,7 +116,11 @@ struct Options {
   struct Markers {
     std::string family, ids, size, paper;  // print; as typed
   } markers;
-  std::string map_name;
+  struct {
+    std::string file, form, at;  // as typed
+    double number = 0;           // playback seek, speed
+  } replay;
+  std::string map_name, map_file;  // maps save; maps import: file to read
   struct Scene {
     std::string model, shape, material, name, points;  // as typed
     std::string size, at, push, gravity;               // X,Y,Z; empty: not given

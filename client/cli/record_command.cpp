@@ -94,6 +94,13 @@ void AddMachine(CLI::App& app, Options& options) {
                         "Half-open range A:B of frames, from zero");
   calibrate->add_option("--for", options.record.seconds,
                         "End after so many seconds; else a camera ends when nothing is missing");
+  CLI::App* replay = app.add_subcommand(
+      "replay", "What a server has recorded (MCAP), in other forms; needs no server");
+  replay->add_option("file", options.replay.file, "Recorded by `saccade recording start`")
+      ->required();
+  replay->add_option("--export", options.replay.form, "tum: the poses; ply: the map")->required();
+  replay->add_option("--out", options.out, "Folder for trajectory.tum or map.ply")->required();
+  replay->add_option("--at", options.replay.at, "ply: seconds from its beginning; else its end");
   AddMarkers(app, options);
 }
 
@@ -119,6 +126,13 @@ absl::Status RunCalibrateCamera(const Options& options) {
             {"--for", options.record.seconds}},
            words);
   if (options.json) words.emplace_back("--json");
+  return BecomeEval(std::move(words));
+}
+
+absl::Status RunReplay(const Options& options) {
+  std::vector<std::string> words = {"replay", options.replay.file, "--export", options.replay.form,
+                                    "--out",  options.out};
+  AddGiven({{"--at", options.replay.at}}, words);
   return BecomeEval(std::move(words));
 }
 

@@ -20,6 +20,9 @@ absl::Status RunRecord(const Options& options);
 /// Becomes `saccade-eval calibrate-camera` likewise.
 absl::Status RunCalibrateCamera(const Options& options);
 
+/// Becomes `saccade-eval replay` likewise.
+absl::Status RunReplay(const Options& options);
+
 /// Becomes `saccade-eval print-markers` likewise.
 absl::Status RunPrintMarkers(const Options& options);
 

@@ -91,6 +91,10 @@ class Connection {
   absl::StatusOr<std::string> SaveMap(const std::string& name);
   absl::Status LoadMap(const std::string& id);
   absl::Status DeleteMap(const std::string& id);
+  /// The file of a map, as it is to be written; DataLoss: not what the server sent.
+  absl::StatusOr<std::string> ExportMapFile(const std::string& id);
+  /// Such a file into the server, where it keeps its id.
+  absl::StatusOr<StoredMapFacts> ImportMapFile(const std::string& file);
 
   /// `draft.request_id` is filled in if empty, so that a call made again creates nothing twice.
   /// `edit_group`: edits of one session with the same one, not empty, are undone together.
@@ -130,6 +134,14 @@ class Connection {
   absl::Status FollowChat(const std::function<bool(const ChatMessage&)>& on_message);
   /// PermissionDenied: only the wearer does that.
   absl::StatusOr<PicturePause> PausePicture(bool paused);
+
+  absl::StatusOr<Recording> GetRecording();
+  /// PermissionDenied: only the wearer does that.
+  absl::StatusOr<Recording> StartRecording();
+  absl::StatusOr<Recording> StopRecording();
+
+  absl::StatusOr<Replay> GetReplay();
+  absl::StatusOr<Replay> ChangeReplay(const ReplayChange& change);
 
   GazeAnswer GetGaze();
   /// Asks for the lease, or renews it: at least every 200 ms, or it is gone.

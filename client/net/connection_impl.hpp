@@ -17,6 +17,8 @@
 #include "saccade/v1/gaze.grpc.pb.h"
 #include "saccade/v1/map.grpc.pb.h"
 #include "saccade/v1/pointer.grpc.pb.h"
+#include "saccade/v1/recording.grpc.pb.h"
+#include "saccade/v1/replay.grpc.pb.h"
 #include "saccade/v1/scene.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
 #include "saccade/v1/talk.grpc.pb.h"
@@ -38,7 +40,9 @@ class Connection::Impl {
         gaze_(v1::GazeService::NewStub(channel_)),
         pointer_(v1::PointerService::NewStub(channel_)),
         scene_(v1::SceneService::NewStub(channel_)),
-        talk_(v1::TalkService::NewStub(channel_)) {}
+        talk_(v1::TalkService::NewStub(channel_)),
+        recording_(v1::RecordingService::NewStub(channel_)),
+        replay_(v1::ReplayService::NewStub(channel_)) {}
 
   // One unary call with this connection's deadline.
   template <typename Stub, typename Request, typename Response>
@@ -130,6 +134,8 @@ class Connection::Impl {
   const std::unique_ptr<v1::PointerService::Stub> pointer_;
   const std::unique_ptr<v1::SceneService::Stub> scene_;
   const std::unique_ptr<v1::TalkService::Stub> talk_;
+  const std::unique_ptr<v1::RecordingService::Stub> recording_;
+  const std::unique_ptr<v1::ReplayService::Stub> replay_;
 };
 
 }  // namespace saccade::net

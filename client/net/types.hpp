@@ -43,6 +43,27 @@ struct PicturePause {
   std::int64_t since_unix_ns = 0;
 };
 
+/// What the server records, or recorded last.
+struct Recording {
+  bool on = false;
+  std::string file;                // on the server's disk; empty: none since its start
+  std::int64_t since_unix_ns = 0;  // 0: never
+  std::uint64_t bytes = 0, messages = 0, events_lost = 0;
+  std::string problem;  // why it stopped by itself; empty: it did not
+};
+
+/// Where the replay of a recording is.
+struct Replay {
+  std::string file;
+  bool playing = false;
+  double position_s = 0, length_s = 0, speed = 1;
+};
+/// What is to be different; nothing: stays.
+struct ReplayChange {
+  std::optional<bool> playing;
+  std::optional<double> position_s, speed;
+};
+
 /// One line of the conversation.
 struct ChatMessage {
   std::uint64_t number = 0;  // from 1, rises while the server runs

@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::size_t kJobsWaiting = 16;
 constexpr int kFirstAfter_s = 10;  // of the run
-constexpr std::size_t kLongestName = 200;
 
 }  // namespace
 
@@ -106,7 +105,7 @@ absl::StatusOr<std::optional<StoredWorld>> MapKeeper::ReadFirst(const std::strin
     if (all.empty()) return std::nullopt;
     wanted = all.front().id;
   }
-  absl::StatusOr<MapShelf::Kept> kept = shelf_.Load(wanted);
+  absl::StatusOr<KeptMap> kept = shelf_.Load(wanted);
   if (!kept.ok()) return kept.status();
   return StoredWorld{std::make_shared<const StoredMap>(std::move(kept->map)), kept->facts.world};
 }
@@ -116,9 +115,9 @@ void MapKeeper::List(Done<std::vector<KeptMapFacts>> done) {
 }
 
 void MapKeeper::Save(std::string name, Done<std::string> done) {
-  if (name.empty() || name.size() > kLongestName) {
+  if (name.empty() || name.size() > kLongestMapName) {
     return done(absl::InvalidArgumentError(
-        absl::StrCat("name: give one of 1 to ", kLongestName, " bytes")));
+        absl::StrCat("name: give one of 1 to ", kLongestMapName, " bytes")));
   }
   const auto answer = [this, name = std::move(name), done](absl::StatusOr<StoredWorld> stored) {
     if (!stored.ok()) return done(stored.status());
@@ -135,7 +134,7 @@ void MapKeeper::Save(std::string name, Done<std::string> done) {
 
 void MapKeeper::Load(std::string id, DoneEmpty done) {
   const auto resume = [this, id = std::move(id), done] {
-    absl::StatusOr<MapShelf::Kept> kept = shelf_.Load(id);
+    absl::StatusOr<KeptMap> kept = shelf_.Load(id);
     if (!kept.ok()) return done(kept.status());
     StoredWorld stored{std::make_shared<const StoredMap>(std::move(kept->map)), kept->facts.world};
     if (absl::Status asked = port_->Submit(ResumeMap{std::move(stored), done}); !asked.ok()) {
@@ -156,6 +155,18 @@ void MapKeeper::Load(std::string id, DoneEmpty done) {
 
 void MapKeeper::Remove(std::string id, DoneEmpty done) {
   Post([this, id = std::move(id), done] { done(shelf_.Remove(id)); }, done);
+}
+
+void MapKeeper::ReadFile(MapFileRequest request, Done<MapFilePiece> done) {
+  Post([this, request = std::move(request),
+        done] { done(transfer_.Read(request, std::chrono::steady_clock::now())); },
+       [done](const absl::Status& why) { done(why); });
+}
+
+void MapKeeper::Import(MapImportPiece piece, Done<MapImportProgress> done) {
+  Post([this, piece = std::move(piece),
+        done] { done(transfer_.Import(piece, std::chrono::steady_clock::now())); },
+       [done](const absl::Status& why) { done(why); });
 }
 
 }  // namespace saccade

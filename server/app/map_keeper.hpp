@@ -10,6 +10,7 @@
 #include "server/pipeline/kept_maps.hpp"
 #include "server/pipeline/runner.hpp"
 #include "server/store/map_shelf.hpp"
+#include "server/store/map_transfer.hpp"
 
 namespace saccade {
 
@@ -44,6 +45,8 @@ class MapKeeper final : public KeptMaps {
   void Save(std::string name, Done<std::string> done) override;
   void Load(std::string id, DoneEmpty done) override;
   void Remove(std::string id, DoneEmpty done) override;
+  void ReadFile(MapFileRequest request, Done<MapFilePiece> done) override;
+  void Import(MapImportPiece piece, Done<MapImportProgress> done) override;
 
  private:
   /// Runs on the thread; `refused` says why it will not.
@@ -56,6 +59,7 @@ class MapKeeper final : public KeptMaps {
   const MapKeeperOptions options_;
   CommandPort* port_ = nullptr;
   MapShelf shelf_;  // the thread's, and whoever calls before it has anything to do
+  MapTransfer transfer_{shelf_};
   int seconds_ = 0;
   std::atomic<bool> asked_ = false;
   // Of what was written last: without news nothing is.

@@ -35,13 +35,14 @@ struct Raw {
                               http = "127.0.0.1:8080", gl = "osmesa", speed = "realtime", sim_truth,
                               web_root, public_url, trusted_proxy, tls_certificate, tls_key,
                               client_ca, audio_in, audio_out, map = "last", team, team_name,
-                              team_token, team_invite, team_trust;
+                              team_token, team_invite, team_trust, record;
   std::map<std::string, AccessRole> client_roles;
   bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
   bool overlay_dots = false, overlay_axes = false, overlay_status = false;
   double run_for_s = -1.0;
   std::int64_t bit_rate = 0;
   std::int64_t seed = 1;
+  std::int64_t record_file_mb = 1024, record_file_s = 600, record_keep_free_mb = 1024;
 };
 
 /// One thing that can be said, once for the flag, the file, --help and --print-config.
@@ -56,7 +57,7 @@ const std::vector<Setting>& Settings() {
   static const std::vector<Setting> settings = {
       {"source", "--source", &Raw::source,
        "sim:desk[?...] | dataset:DIR[?fps=N] | v4l2:DEVICE[?...] | file:VIDEO[?...] | rtsp://... | "
-       "phone:[?...]"},
+       "phone:[?...] | replay:FILE.mcap"},
       {"mount", "--mount", &Raw::mount, MountDrivers().Usage()},
       {nullptr, "--config", &Raw::config, "TOML file; flags win over it"},
       {"data_dir", "--data-dir", &Raw::data_dir, "annotations are kept here"},
@@ -79,6 +80,8 @@ const std::vector<Setting>& Settings() {
        "none: neither (saccade maps list)"},
       {nullptr, "--run-for", &Raw::run_for_s, "end after so many seconds"},
       {nullptr, "--sim-truth", &Raw::sim_truth, "JSON lines of the simulator's truth"},
+      {nullptr, "--record", &Raw::record,
+       "record from the start into this folder (MCAP): video, poses, map, marks"},
       {"web_root", nullptr, &Raw::web_root, "the page's files; empty: where they were built"},
       {"seed", nullptr, &Raw::seed, "of the tracker and of a simulated mount"},
       {"tls.certificate", "--tls-certificate", &Raw::tls_certificate,
@@ -100,6 +103,11 @@ const std::vector<Setting>& Settings() {
        "a link or ID.SECRET of its `saccade invite --role pilot`; redeemed once, the token is "
        "kept"},
       {"team.token", nullptr, &Raw::team_token, "what that invite was redeemed for, if it was"},
+      {"record.file_mb", nullptr, &Raw::record_file_mb,
+       "recordings begin another file after so many MB, 1 to 1048576"},
+      {"record.file_s", nullptr, &Raw::record_file_s, "and after so many seconds, 1 to 86400"},
+      {"record.keep_free_mb", nullptr, &Raw::record_keep_free_mb,
+       "a recording stops where less than so many MB of the disk are free"},
       {"overlay.dots", nullptr, &Raw::overlay_dots,
        "the tracker's features in the augmented view, which is the wearer's"},
       {"overlay.axes", nullptr, &Raw::overlay_axes, "the world's axes in it"},
@@ -350,6 +358,26 @@ absl::Status CheckTeam(const Raw& raw, ServerConfig& config) {
   return absl::OkStatus();
 }
 
+absl::Status CheckRecord(const Raw& raw, ServerConfig& config) {
+  if (raw.record_file_mb < 1 || raw.record_file_mb > 1'048'576) {
+    return Bad(absl::StrCat("record.file_mb: ", raw.record_file_mb, ": give 1 to 1048576"));
+  }
+  if (raw.record_file_s < 1 || raw.record_file_s > 86'400) {
+    return Bad(absl::StrCat("record.file_s: ", raw.record_file_s, ": give 1 to 86400"));
+  }
+  if (raw.record_keep_free_mb < 0 || raw.record_keep_free_mb > std::int64_t{1} << 40) {
+    return Bad(absl::StrCat("record.keep_free_mb: ", raw.record_keep_free_mb,
+                            ": give a whole number from 0"));
+  }
+  config.record = !raw.record.empty();
+  config.record_dir =
+      config.record ? std::filesystem::path(raw.record) : config.data_dir / "recordings";
+  config.record_file_mb = raw.record_file_mb;
+  config.record_file_s = raw.record_file_s;
+  config.record_keep_free_mb = raw.record_keep_free_mb;
+  return absl::OkStatus();
+}
+
 absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   ServerConfig config;
   if (raw.source.empty()) return Bad("--source is missing, e.g. --source sim:desk");
@@ -360,6 +388,7 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   config.data_dir = raw.data_dir.empty() ? DefaultDataDir() : std::filesystem::path(raw.data_dir);
   if (config.data_dir.empty()) return Bad("--data-dir is missing, and HOME is not set");
   config.camera_file = raw.camera;
+  if (absl::Status record = CheckRecord(raw, config); !record.ok()) return record;
   config.insecure = raw.insecure;
   if (absl::Status addresses = CheckAddresses(raw, config); !addresses.ok()) return addresses;
   if (absl::Status identity = CheckIdentity(raw, config); !identity.ok()) return identity;

@@ -56,6 +56,10 @@ struct ServerConfig {
   std::string team_invite;            // "ID.SECRET"
   std::filesystem::path team_trust;   // PEM of the other's root; empty: plain
   std::string audio_in, audio_out;    // ALSA's names; empty: no voice of the wearer's here
+  /// Recordings go here, one from the start if `record` is set; empty: DIR/recordings.
+  std::filesystem::path record_dir;
+  bool record = false;
+  std::int64_t record_file_mb = 1024, record_file_s = 600, record_keep_free_mb = 1024;  // [record]
   // Only in the file: reasons to change them are rare.
   int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size
   LimitSettings limits;            // [limits]

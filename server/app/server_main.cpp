@@ -2,6 +2,7 @@
 #include <absl/cleanup/cleanup.h>
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
 
 #include <algorithm>
 #include <chrono>
@@ -16,6 +17,7 @@
 #include "server/app/map_keeper.hpp"
 #include "server/app/memory.hpp"
 #include "server/app/open_source.hpp"
+#include "server/app/replay_backend.hpp"
 #include "server/app/server_config.hpp"
 #include "server/app/shutdown.hpp"
 #include "server/app/view_encoder.hpp"
@@ -23,6 +25,7 @@
 #include "server/calibrate/calibration_desk.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/pipeline/descriptors.hpp"
+#include "server/record/recorder.hpp"
 #include "server/rpc/rpc_server.hpp"
 #include "server/rpc/stream_hub.hpp"
 #include "server/store/annotation_store.hpp"
@@ -210,20 +213,49 @@ void SayProblem(const absl::Status& problem) {
   FlushLog(std::chrono::milliseconds(500));
 }
 
+/// A recording in the engine's place.
+struct Replay {
+  static absl::StatusOr<std::unique_ptr<Replay>> Open(const std::string& file) {
+    auto replayer = Replayer::Open(file);
+    if (!replayer.ok()) return replayer.status();
+    return std::unique_ptr<Replay>(new Replay(*std::move(replayer), file));
+  }
+  Replayer& replayer() { return *player; }
+
+  const std::unique_ptr<Replayer> player;
+  ReplayBackend backend;
+
+ private:
+  Replay(std::unique_ptr<Replayer> opened, const std::string& file)
+      : player(std::move(opened)), backend(*player, Version(), absl::StrCat("replay:", file)) {}
+};
+
 absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   RaiseDescriptorLimit();
   StreamHub hub;
   WearerTee tee(hub);
   PhoneSource* phone = nullptr;
   std::shared_ptr<CalibrationDesk> calibration;
-  absl::StatusOr<std::unique_ptr<Engine>> engine =
-      MakeEngine(config, tee, phone, calibration, shutdown);
-  if (!engine.ok()) return engine.status();
+  // One of the two: what happens, or what has happened.
+  std::unique_ptr<Engine> engine;
+  std::unique_ptr<Replay> replay;
+  if (absl::string_view file = config.source; absl::ConsumePrefix(&file, "replay:")) {
+    auto opened = Replay::Open(std::string(file));
+    if (!opened.ok()) return opened.status();
+    replay = *std::move(opened);
+  } else {
+    auto made = MakeEngine(config, tee, phone, calibration, shutdown);
+    if (!made.ok()) return made.status();
+    engine = *std::move(made);
+  }
+  Backend& backend = engine ? static_cast<Backend&>(*engine) : replay->backend;
   const absl::Cleanup no_commit = [&shutdown] { shutdown.SetCommit(nullptr); };
-  shutdown.SetCommit(
-      [&engine](std::chrono::milliseconds limit) { return (*engine)->FlushStore(limit); });
-  hub.Connect(engine->get());
-  const std::unique_ptr<TeamRunner> team = MakeTeam(config, **engine);
+  if (engine) {
+    shutdown.SetCommit(
+        [&engine](std::chrono::milliseconds limit) { return engine->FlushStore(limit); });
+  }
+  hub.Connect(&backend);
+  const std::unique_ptr<TeamRunner> team = engine ? MakeTeam(config, *engine) : nullptr;
   absl::StatusOr<std::optional<TeamLinkOptions>> to_other = LinkOf(config);
   if (!to_other.ok()) return to_other.status();
   RpcServerOptions rpc_options;
@@ -231,13 +263,23 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
   rpc_options.port = config.grpc.port;
   rpc_options.calibration = calibration.get();
   rpc_options.team = team.get();
+  constexpr std::uint64_t kMegabyte = std::uint64_t{1} << 20;
+  Recorder recorder(
+      hub, {.directory = config.record_dir,
+            .file_bytes = static_cast<std::uint64_t>(config.record_file_mb) * kMegabyte,
+            .file_length = std::chrono::seconds(config.record_file_s),
+            .keep_free_bytes = static_cast<std::uint64_t>(config.record_keep_free_mb) * kMegabyte,
+            .version = Version(),
+            .source = NameForReports(config.source)});
+  rpc_options.recording = &recorder;
+  rpc_options.replay = replay ? &replay->replayer() : nullptr;
   ApplyLimits(config, rpc_options);
   shutdown.SetPhase("making certificates");
   const absl::StatusOr<std::unique_ptr<FrontDoor>> door = FrontDoor::Open(config);
   if (!door.ok()) return door.status();
   if (absl::Status let = LetIn(**door, config, rpc_options); !let.ok()) return let;
   shutdown.SetPhase("opening the ports");
-  absl::StatusOr<std::unique_ptr<RpcServer>> rpc = RpcServer::Start(rpc_options, **engine, hub);
+  absl::StatusOr<std::unique_ptr<RpcServer>> rpc = RpcServer::Start(rpc_options, backend, hub);
   if (!rpc.ok()) return rpc.status();
   // Its kind: the whole may hold a password.
   const std::string other = config.source.substr(0, config.source.find(':'));
@@ -276,19 +318,25 @@ absl::Status Serve(const ServerConfig& config, Shutdown& shutdown) {
     if (!opened.ok()) return opened.status();
     voice = *std::move(opened);
   }
-  (*engine)->Start();
+  engine ? engine->Start() : replay->replayer().Start(tee);
+  if (config.record) {
+    recorder.StartRecording([](const absl::StatusOr<RecordingState>& started) {
+      if (!started.ok()) Log(absl::StrCat("recording: ", started.status().message()));
+    });
+  }
   std::unique_ptr<TeamLink> link;
-  if (*to_other) link = std::make_unique<TeamLink>(**std::move(to_other), *team);
+  if (team && *to_other) link = std::make_unique<TeamLink>(**std::move(to_other), *team);
   shutdown.SetPhase("a frame, a call or the disk to be done with");
   SayReady(config, (*rpc)->port(), (*gateway)->port());
   shutdown.Wait(config.run_for_s);
   voice.reset();
   link.reset();
-  team->Stop();
+  if (team) team->Stop();
+  recorder.Stop();
   // Streams end first, then browsers, then the threads that answer commands, then calls.
   hub.CloseAll(absl::UnavailableError("the server is shutting down"));
   (*gateway)->Stop();
-  (*engine)->Stop();
+  engine ? engine->Stop() : replay->replayer().Stop();
   (*rpc)->Stop(std::chrono::milliseconds(500));
   return absl::OkStatus();
 }

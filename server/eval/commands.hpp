@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,11 @@ struct RenderArguments {
   std::filesystem::path camera;  // record: instead of the source's own camera.yaml
   double seconds = 0;            // record: end after so long; 0: with the source
   bool depth = false;            // render: DIR/000123.depth.png beside each picture
+};
+struct ReplayArguments {
+  std::filesystem::path file, out;
+  std::string form;            // tum or ply
+  std::optional<double> at_s;  // ply: of the recording; nothing: its end
 };
 struct CalibrateArguments {
   std::string source, frames;
@@ -126,6 +132,9 @@ absl::Status RenderCommand(const RenderArguments& arguments);
 absl::Status RecordSimulator(const RenderArguments& arguments);
 /// Writes any source as a recording in TUM layout (RecordSource), a simulated one with its truth.
 absl::Status RecordCommand(const RenderArguments& arguments);
+/// Writes what a server has recorded (docs/design/recordings.md) as trajectory.tum, or the map as
+/// it was known then as map.ply, into a folder.
+absl::Status ReplayCommand(const ReplayArguments& arguments);
 /// Finds a camera's lens from a source that shows a target and writes it as camera.yaml, with
 /// sigmas; refuses where the views do not determine it.
 absl::Status CalibrateCameraCommand(const CalibrateArguments& arguments);

@@ -303,6 +303,18 @@ void AddFigures(CLI::App& app, std::filesystem::path& out) {
   figures->add_option("--out", out, "Folder for the pictures")->required();
 }
 
+void AddReplay(CLI::App& app, ReplayArguments& arguments) {
+  CLI::App* replay =
+      app.add_subcommand("replay", "What a server has recorded (MCAP), in other forms");
+  replay->add_option("file", arguments.file, "Recorded by `saccade recording start`")->required();
+  replay->add_option("--export", arguments.form, "tum: the poses; ply: the map")
+      ->check(CLI::IsMember({"tum", "ply"}))
+      ->required();
+  replay->add_option("--out", arguments.out, "Folder for trajectory.tum or map.ply")->required();
+  replay->add_option("--at", arguments.at_s, "ply: seconds from its beginning; else its end")
+      ->check(Finite());
+}
+
 /// SIGINT and SIGTERM end the program at once, whatever it does and whoever started it: a shell
 /// starts what is in the background deaf to SIGINT, and a mask of blocked signals is inherited.
 void HearSignals() {
@@ -369,6 +381,8 @@ int Main(int argc, char** argv) {
   AddPlacements(app, placements);
   AddOcclusion(app, occlusion);
   AddTeam(app, team);
+  ReplayArguments replay;
+  AddReplay(app, replay);
   std::filesystem::path figures;
   AddFigures(app, figures);
   SurfaceArguments surface;
@@ -396,6 +410,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("figures")) status = FiguresCommand(figures);
   if (app.got_subcommand("occlusion")) status = OcclusionCommand(occlusion);
   if (app.got_subcommand("surface")) status = SurfaceCommand(surface);
+  if (app.got_subcommand("replay")) status = ReplayCommand(replay);
   if (app.got_subcommand("team")) status = TeamCommand(team);
   return status.ok() ? 0 : Fail(status);
 }

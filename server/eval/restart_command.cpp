@@ -230,7 +230,7 @@ absl::StatusOr<SecondRun> ComeBack(const RestartArguments& arguments, const Firs
   if (!wearable.ok()) return wearable.status();
   const std::vector<KeptMapFacts> kept = shelf.List();
   if (kept.empty()) return absl::DataLossError("restart: the map that was saved is not there");
-  absl::StatusOr<MapShelf::Kept> read = shelf.Load(kept.front().id);
+  absl::StatusOr<KeptMap> read = shelf.Load(kept.front().id);
   if (!read.ok()) return read.status();
   const StoredWorld stored{std::make_shared<const StoredMap>(std::move(read->map)),
                            read->facts.world};

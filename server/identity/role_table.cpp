@@ -61,6 +61,13 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"TeamService/Follow", kViewer},
     {"TeamService/Tell", kPilot},  // another wearer's server: its marks come in
 
+    {"RecordingService/GetRecording", kViewer},
+    {"RecordingService/StartRecording", kWearer},  // whose eyes it is
+    {"RecordingService/StopRecording", kWearer},
+
+    {"ReplayService/GetReplay", kViewer},
+    {"ReplayService/ChangeReplay", kPilot},  // for all who watch
+
     {"MapService/Get", kViewer},
     {"MapService/Export", kViewer},
     {"MapService/List", kViewer},
@@ -68,6 +75,8 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"MapService/Save", kPilot},
     {"MapService/Load", kPilot},
     {"MapService/Delete", kPilot},
+    {"MapService/ExportFile", kPilot},
+    {"MapService/ImportFile", kPilot},
 
     {"GazeService/GetState", kViewer},
     {"GazeService/GetMountCalibration", kViewer},

@@ -38,6 +38,19 @@ std::string ToPly(const MapSnapshot& snapshot) {
   return ply;
 }
 
+void Fill(const KeptMapFacts& facts, v1::StoredMapFacts& out) {
+  out.set_map_id(facts.id);
+  out.set_name(facts.name);
+  out.set_world_id(facts.world);
+  out.set_saved_unix_s(facts.saved_unix_s);
+  out.set_metric(facts.metric);
+  out.set_landmark_count(facts.landmarks);
+  out.set_place_count(facts.places);
+  out.set_width(static_cast<std::uint32_t>(facts.width));
+  out.set_height(static_cast<std::uint32_t>(facts.height));
+  out.set_bytes(facts.bytes);
+}
+
 absl::Status NoMapYet() {
   return absl::FailedPreconditionError("no frame has been tracked yet: try again shortly");
 }
@@ -54,6 +67,8 @@ MapService::MapService(Backend& backend, StreamHub& hub, Gatekeeper& gate)
   MarkMethodCallback(4, Early(gate, "MapService/Load", this, &MapService::Load));
   MarkMethodCallback(5, Early(gate, "MapService/List", this, &MapService::List));
   MarkMethodCallback(6, Early(gate, "MapService/Delete", this, &MapService::Delete));
+  MarkMethodCallback(7, Early(gate, "MapService/ExportFile", this, &MapService::ExportFile));
+  MarkMethodCallback(8, Early(gate, "MapService/ImportFile", this, &MapService::ImportFile));
 }
 
 grpc::ServerUnaryReactor* MapService::Get(grpc::CallbackServerContext* context,
@@ -133,17 +148,7 @@ grpc::ServerUnaryReactor* MapService::List(grpc::CallbackServerContext* context,
       call.Answer<std::vector<KeptMapFacts>>([response](const std::vector<KeptMapFacts>& all) {
         for (const KeptMapFacts& facts : all) {
           response->add_map_ids(facts.id);
-          v1::StoredMapFacts& out = *response->add_maps();
-          out.set_map_id(facts.id);
-          out.set_name(facts.name);
-          out.set_world_id(facts.world);
-          out.set_saved_unix_s(facts.saved_unix_s);
-          out.set_metric(facts.metric);
-          out.set_landmark_count(facts.landmarks);
-          out.set_place_count(facts.places);
-          out.set_width(static_cast<std::uint32_t>(facts.width));
-          out.set_height(static_cast<std::uint32_t>(facts.height));
-          out.set_bytes(facts.bytes);
+          Fill(facts, *response->add_maps());
         }
       }));
   return call.reactor();
@@ -156,6 +161,40 @@ grpc::ServerUnaryReactor* MapService::Delete(grpc::CallbackServerContext* contex
   const absl::StatusOr<KeptMaps*> maps = Enter(call, Toll::kReset);
   if (!maps.ok()) return call.Finish(maps.status());
   (*maps)->Remove(request->map_id(), call.Answer());
+  return call.reactor();
+}
+
+grpc::ServerUnaryReactor* MapService::ExportFile(grpc::CallbackServerContext* context,
+                                                 const v1::ExportMapFileRequest* request,
+                                                 v1::ExportMapFileResponse* response) {
+  const bool first = request->offset_bytes() == 0;  // reads it all
+  UnaryCall call(*context, "MapService/ExportFile",
+                 first ? UnaryCall::Log::kAll : UnaryCall::Log::kRefusals);
+  const absl::StatusOr<KeptMaps*> maps = Enter(call, first ? Toll::kReset : Toll::kRead);
+  if (!maps.ok()) return call.Finish(maps.status());
+  (*maps)->ReadFile({request->map_id(), request->offset_bytes(), request->file_crc32()},
+                    call.Answer<MapFilePiece>([response](const MapFilePiece& piece) {
+                      response->set_total_bytes(piece.total);
+                      response->set_file_crc32(piece.checksum);
+                      response->set_data(piece.data);
+                    }));
+  return call.reactor();
+}
+
+grpc::ServerUnaryReactor* MapService::ImportFile(grpc::CallbackServerContext* context,
+                                                 const v1::ImportMapFileRequest* request,
+                                                 v1::ImportMapFileResponse* response) {
+  const bool first = request->offset_bytes() == 0;
+  UnaryCall call(*context, "MapService/ImportFile",
+                 first ? UnaryCall::Log::kAll : UnaryCall::Log::kRefusals);
+  const absl::StatusOr<KeptMaps*> maps = Enter(call, first ? Toll::kReset : Toll::kEdit);
+  if (!maps.ok()) return call.Finish(maps.status());
+  (*maps)->Import({request->upload_id(), request->total_bytes(), request->offset_bytes(),
+                   request->file_crc32(), request->data()},
+                  call.Answer<MapImportProgress>([response](const MapImportProgress& progress) {
+                    response->set_received_bytes(progress.received);
+                    if (progress.whole) Fill(*progress.whole, *response->mutable_map());
+                  }));
   return call.reactor();
 }
 

@@ -8,7 +8,7 @@
 
 namespace saccade {
 
-/// The map at large, and those that are kept. Reset, Save, Load and Delete are for those who steer.
+/// The map at large, and those that are kept. What is more than looking is for those who steer.
 /// Handlers never block.
 class MapService final : public v1::MapService::CallbackService {
  public:
@@ -36,6 +36,12 @@ class MapService final : public v1::MapService::CallbackService {
   grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context,
                                    const v1::DeleteMapRequest* request,
                                    v1::DeleteMapResponse* response) override;
+  grpc::ServerUnaryReactor* ExportFile(grpc::CallbackServerContext* context,
+                                       const v1::ExportMapFileRequest* request,
+                                       v1::ExportMapFileResponse* response) override;
+  grpc::ServerUnaryReactor* ImportFile(grpc::CallbackServerContext* context,
+                                       const v1::ImportMapFileRequest* request,
+                                       v1::ImportMapFileResponse* response) override;
   /// Whether the call may come in, and where maps are kept.
   absl::StatusOr<KeptMaps*> Enter(UnaryCall& call, Toll toll);
 

@@ -16,6 +16,8 @@
 #include "server/rpc/map_service.hpp"
 #include "server/rpc/pointer_board.hpp"
 #include "server/rpc/pointer_service.hpp"
+#include "server/rpc/recording_service.hpp"
+#include "server/rpc/replay_service.hpp"
 #include "server/rpc/scene_service.hpp"
 #include "server/rpc/session_service.hpp"
 #include "server/rpc/talk_service.hpp"
@@ -106,7 +108,9 @@ class RpcServer::Impl {
         scene_service_(backend, gate_),
         calibration_service_(options.calibration, gate_),
         talk_service_(backend, hub, gate_, options.limits.voice_packets),
-        team_service_(options.team, gate_) {
+        team_service_(options.team, gate_),
+        recording_service_(options.recording, gate_),
+        replay_service_(options.replay, gate_) {
     access_.SetOnEnded([this](const std::vector<std::string>& ids, const absl::Status& why) {
       sessions_.End(ids);
       pointers_.EndAccess(ids);
@@ -158,6 +162,8 @@ class RpcServer::Impl {
     builder.RegisterService(&calibration_service_);
     builder.RegisterService(&talk_service_);
     builder.RegisterService(&team_service_);
+    builder.RegisterService(&recording_service_);
+    builder.RegisterService(&replay_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr) return absl::UnavailableError("grpc: the server could not be started");
     listener_ = *std::move(listener);
@@ -208,6 +214,8 @@ class RpcServer::Impl {
   CalibrationService calibration_service_;
   TalkService talk_service_;
   TeamService team_service_;
+  RecordingService recording_service_;
+  ReplayService replay_service_;
   std::unique_ptr<LivePem> pem_, client_ca_;  // null: plain; no machines
   std::unique_ptr<GrpcListener> listener_;    // outlives the server, to which its acceptor belongs
   std::unique_ptr<grpc::Server> server_;

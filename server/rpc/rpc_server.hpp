@@ -12,6 +12,8 @@
 #include "server/identity/identity_provider.hpp"
 #include "server/pipeline/calibration.hpp"
 #include "server/pipeline/connection_limits.hpp"
+#include "server/pipeline/recording.hpp"
+#include "server/pipeline/replay.hpp"
 #include "server/pipeline/team_port.hpp"
 #include "server/rpc/admission.hpp"
 #include "server/rpc/backend.hpp"
@@ -61,6 +63,10 @@ struct RpcServerOptions {
   IdentityProvider* provider = nullptr;
   /// Who calibrates the camera; outlives the server. Null: nobody.
   CalibrationPort* calibration = nullptr;
+  /// Who records; outlives the server. Null: nobody.
+  RecordingPort* recording = nullptr;
+  /// The recording that is played in an engine's place; outlives the server. Null: none.
+  ReplayPort* replay = nullptr;
   /// This server's part in a team; outlives the server. Null: none.
   TeamPort* team = nullptr;
   /// What a browser opens with an invite. Any thread.

@@ -321,6 +321,9 @@ void StreamHub::StreamsChanged() {
   {
     const std::lock_guard lock(mutex_);
     for (const auto& stream : streams_) {
+      if (stream->wants_video()) wanted[static_cast<std::size_t>(stream->view())] = true;
+      // A recording has two streams.
+      if (!present->insert(stream->session().participant_id).second) continue;
       v1::Participant& participant = *presence->add_participants();
       participant.set_participant_id(stream->session().participant_id);
       participant.set_display_name(stream->session().display_name);
@@ -328,8 +331,6 @@ void StreamHub::StreamsChanged() {
       participant.set_person_id(stream->session().person_id);
       participant.set_color_rgba(stream->session().color_rgba);
       participant.set_listens(stream->listens());
-      present->insert(stream->session().participant_id);
-      if (stream->wants_video()) wanted[static_cast<std::size_t>(stream->view())] = true;
     }
     presence_ = presence;
     backend_->SetPresence(std::move(present));

@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/map/stored_map.hpp"
-#include "server/pipeline/kept_maps.hpp"
+#include "server/store/map_file.hpp"
 
 namespace saccade {
 
@@ -23,21 +22,19 @@ class MapShelf {
   /// Writes `map` under `facts.id`, in place of what was there; what `facts` says of its content is
   /// filled in. Unavailable: the disk, with the reason.
   absl::Status Save(KeptMapFacts facts, const StoredMap& map);
-  struct Kept {
-    KeptMapFacts facts;
-    StoredMap map;
-  };
   ///   InvalidArgument  no id of a map
   ///   NotFound         there is no such map
   ///   DataLoss         damaged, or of a later version; names the file
-  absl::StatusOr<Kept> Load(const std::string& id);
+  absl::StatusOr<KeptMap> Load(const std::string& id);
   absl::Status Remove(const std::string& id);
   /// Of those without a name the oldest go, until `most` are left.
   void Thin(std::size_t most);
 
- private:
+  const std::filesystem::path& directory() const { return directory_; }
+  /// Where `id`, which must be one (IsMapId), is or would be.
   std::filesystem::path FileOf(const std::string& id) const;
 
+ private:
   std::filesystem::path directory_;
   std::vector<std::string> told_;  // files that could not be read
 };

@@ -18,7 +18,7 @@ constexpr auto kServerOrder = std::to_array<string_view>(
     {"pipeline", "mount",     "gl",       "capture", "sim",     "scene", "features",
      "markers",  "calibrate", "filter",   "map",     "surface", "team",  "tracker",
      "anchors",  "gaze",      "wearable", "overlay", "encode",  "store", "identity",
-     "rpc",      "wear",      "audio",    "gateway", "eval",    "app"});
+     "rpc",      "record",    "wear",     "audio",   "gateway", "eval",  "app"});
 constexpr auto kClientOrder =
     std::to_array<string_view>({"net", "session", "talk", "decode", "tools", "view", "cli", "app"});
 constexpr auto kSharedOrder =
@@ -46,7 +46,8 @@ struct Home {
 const std::vector<Home>& Homes() {
   static const std::vector<Home> homes = {
       {"*.grpc.pb.h", {"server/rpc", "server/audio", "client/net"}},
-      {"*.pb.h", {"shared/wire", "server/rpc", "server/wear", "server/audio", "client/net"}},
+      {"*.pb.h",
+       {"shared/wire", "server/rpc", "server/record", "server/wear", "server/audio", "client/net"}},
       {"grpcpp/", {"server/rpc", "server/audio", "server/gateway", "server/app", "client/net"}},
       {"boost/beast", {"server/gateway"}},
       {"sqlite3.h", {"server/store"}},

@@ -4,6 +4,8 @@
 #include <signal.h>
 
 #include <chrono>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -51,6 +53,29 @@ class Maps : public ::testing::Test {
     EXPECT_EQ(server.process().Wait(seconds(4)), 0) << server.process().err();
   }
 
+  void GoesOutAndComesIn(const Server& server) {
+    const std::string file = folder_ / "bench.map", damaged = folder_ / "damaged.map";
+    const RunResult out = Saccade(server, {"maps", "export", "bench", "--out", file, "--json"});
+    ASSERT_EQ(out.exit_code, 0) << out.err;
+    const std::string id = json::parse(out.out)["id"];
+    EXPECT_EQ(ReadFile(file), ReadFile(folder_ / ("data/maps/" + id + ".map")));
+    EXPECT_THAT(Saccade(server, {"maps", "import", file}).err, HasSubstr("is kept here already"));
+    EXPECT_EQ(Saccade(server, {"maps", "delete", id}).exit_code, 0);
+    std::string bytes = ReadFile(file);
+    bytes[bytes.size() / 2] ^= 1;
+    std::ofstream(damaged, std::ios::binary) << bytes;
+    EXPECT_THAT(Saccade(server, {"maps", "import", damaged}).err, HasSubstr("is damaged"));
+    EXPECT_EQ(List(server).size(), 1U);
+    const RunResult in = Saccade(server, {"maps", "import", file});
+    EXPECT_EQ(in.exit_code, 0) << in.err;
+    EXPECT_THAT(in.out, HasSubstr("took in the map " + id + " 'bench'"));
+    EXPECT_EQ(Saccade(server, {"maps", "load", "bench"}).exit_code, 0) << "and can be come back to";
+  }
+  static std::string ReadFile(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
   TemporaryFolder folder_;
 };
 
@@ -82,6 +107,7 @@ TEST_F(Maps, OutliveTheServerAndAreComeBackTo) {
                 HasSubstr("there is no map cellar"));
     EXPECT_EQ(Saccade(server, {"maps", "delete", "again"}).exit_code, 0);
     EXPECT_EQ(List(server).size(), 2U);
+    GoesOutAndComesIn(server);
     EXPECT_THAT(Saccade(server, {"maps", "list"}).out, HasSubstr("(kept by itself)"));
     End(server);
   }

@@ -16,6 +16,8 @@
 #include "saccade/v1/gaze.pb.h"
 #include "saccade/v1/map.pb.h"
 #include "saccade/v1/pointer.pb.h"
+#include "saccade/v1/recording.pb.h"
+#include "saccade/v1/replay.pb.h"
 #include "saccade/v1/scene.pb.h"
 #include "saccade/v1/session.pb.h"
 #include "saccade/v1/team.pb.h"
@@ -81,6 +83,11 @@ const std::map<std::string, Least>& Promised() {
       {"CalibrationService/FinishCalibration", kPilot},
       {"CalibrationService/StopCalibration", kPilot},
       {"CalibrationService/SaveCalibration", kWearer},
+      {"RecordingService/GetRecording", kViewer},
+      {"RecordingService/StartRecording", kWearer},
+      {"RecordingService/StopRecording", kWearer},
+      {"ReplayService/GetReplay", kViewer},
+      {"ReplayService/ChangeReplay", kPilot},
       {"MapService/Get", kViewer},
       {"MapService/Export", kViewer},
       {"MapService/List", kViewer},
@@ -88,6 +95,8 @@ const std::map<std::string, Least>& Promised() {
       {"MapService/Save", kPilot},
       {"MapService/Load", kPilot},
       {"MapService/Delete", kPilot},
+      {"MapService/ExportFile", kPilot},
+      {"MapService/ImportFile", kPilot},
       {"GazeService/GetState", kViewer},
       {"GazeService/GetMountCalibration", kViewer},
       {"GazeService/AcquireLease", kPilot},
@@ -111,7 +120,8 @@ std::vector<const MethodDescriptor*> EveryMethod() {
         v1::ListAnnotationsRequest::descriptor(), v1::GetMapRequest::descriptor(),
         v1::GetGazeStateRequest::descriptor(), v1::PointRequest::descriptor(),
         v1::WearerHello::descriptor(), v1::ListSceneRequest::descriptor(),
-        v1::GetCalibrationRequest::descriptor(), v1::GetTeamRequest::descriptor()}) {
+        v1::GetCalibrationRequest::descriptor(), v1::GetTeamRequest::descriptor(),
+        v1::GetRecordingRequest::descriptor(), v1::GetReplayRequest::descriptor()}) {
     EXPECT_NE(linked, nullptr);
   }
   std::vector<const google::protobuf::FileDescriptor*> files;

@@ -25,6 +25,7 @@ import { InsetCorner } from './inset';
 import { handleKeys } from './keys';
 import { ListDialog } from './list_dialog';
 import { MapPane } from './map_pane';
+import { MapsSheet } from './maps_sheet';
 import { Measuring } from './measuring';
 import { NameDialog } from './name_dialog';
 import { Notes } from './notes';
@@ -126,6 +127,9 @@ export class App {
     this.talk = new TalkPanel(session, state, lookHere, () => this.showSheet());
     this.firstTask = new FirstTask(session, this.map, this.video);
     this.help.onFirstTask = () => this.firstTask.begin();
+    const maps = new MapsSheet(session);
+    this.help.onMaps = () => maps.open();
+    this.strip.element.append(maps.button);
     new ToolNames(this.tools.element);
     this.stage.append(this.map.element, this.video.element, this.notice.element);
     this.stage.append(this.firstTask.element, this.thingsPanel.element);
@@ -138,6 +142,7 @@ export class App {
       this.strip.element,
       this.sheets.element,
       this.help.dialog,
+      maps.dialog,
       dialogs.list.dialog,
       dialogs.picture.dialog,
     );

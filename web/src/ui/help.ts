@@ -20,6 +20,8 @@ export class Help {
   readonly dialog: HTMLDialogElement;
   /** Begins the first task once more. */
   onFirstTask: (() => void) | undefined;
+  /** Shows the maps that are kept; the bottom line, which has a button for it, is not everywhere. */
+  onMaps: (() => void) | undefined;
 
   constructor() {
     const keys = h('dl', {});
@@ -60,6 +62,11 @@ export class Help {
       this.dialog.close();
       this.onFirstTask?.();
     });
+    const maps = h('button', { type: 'button' }, 'Maps that are kept');
+    maps.addEventListener('click', () => {
+      this.dialog.close();
+      this.onMaps?.();
+    });
     this.dialog = h(
       'dialog',
       { 'aria-label': 'Help' },
@@ -74,6 +81,7 @@ export class Help {
         'Drag to orbit, right-drag or Shift-drag to pan, wheel to zoom; on a touch screen one finger, two fingers, pinch. With the map focused: arrow keys orbit, plus and minus zoom, Enter clicks in the middle. With the video focused: arrow keys move the place that Enter clicks at. Tools that are pressed and moved are held from one Enter to the next.',
       ),
       task,
+      maps,
       close,
     );
     this.button.addEventListener('click', () => this.toggle());

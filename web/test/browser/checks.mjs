@@ -8,6 +8,7 @@ import { VideoView } from '../../src/gen/saccade/v1/video_pb.js';
 import { clickedPoint } from './clicked.mjs';
 import { Expert } from './expert.mjs';
 import { frozenPicture } from './freeze.mjs';
+import { checkMaps } from './maps.mjs';
 import { AT_OUTLINES } from './outlines.mjs';
 import { CLEAR, displacement, REACH_PX } from './outline.mjs';
 import { cubePixels, inCamera, length, minus, project } from './optics.mjs';
@@ -73,6 +74,7 @@ export async function runChecks({
     await drawnCubes(context);
     await frozenPicture(context);
     if (!process.env['SACCADE_VERBOSE']) await restart(context, start);
+    await checkMaps({ ...context, sleep, shot: (name) => shot(context, name) });
     context.check(
       'page errors',
       context.expert.errors.length === 0,

@@ -28,6 +28,7 @@ export async function startServer(binary, args, prefix = []) {
     http: `http://${ready.http}`,
     address: ready.http,
     grpc: ready.grpc,
+    pid: child.pid,
     /** Ends it as a person would, then by force; returns how long it took [ms]. */
     async stop() {
       const begin = performance.now();

@@ -11,6 +11,8 @@
 #include <limits>
 #include <string>
 
+#include "server/store/map_transfer.hpp"
+
 namespace saccade::map_shelf_test {
 namespace {
 
@@ -71,6 +73,50 @@ class MapShelfTest : public ::testing::Test {
     std::ofstream(folder_ / (id + ".map"), std::ios::binary) << bytes;
   }
 
+  /// A map whose file has several pieces.
+  std::string LargeFile(const std::string& id) {
+    StoredMap map = SmallMap();
+    const DormantLandmark seen = map.at_rest.back();
+    for (FeatureId more = 3; more < 3000; ++more) {
+      map.at_rest.push_back(seen);
+      map.at_rest.back().landmark.id = more;
+      KeyframeGraph::Point point;
+      point.anchor = 3;
+      point.birth.id = more;
+      map.keyframes.points[more] = point;
+      map.keyframes.keyframes[3].births.push_back(more);
+    }
+    KeptMapFacts facts;
+    facts.id = facts.world = id;
+    facts.name = "Küche";
+    return EncodeMapFile(facts, map);
+  }
+  static MapImportPiece Piece(const std::string& file, std::size_t offset, std::size_t size) {
+    return {.upload_id = "af1c2c9e-3d43-4d0a-9f5e-0c9b1a7f2d11",
+            .total = file.size(),
+            .offset = offset,
+            .checksum = MapChecksum(file),
+            .data = file.substr(offset, size)};
+  }
+  static absl::StatusOr<MapImportProgress> ImportAll(MapTransfer& transfer,
+                                                     const std::string& file) {
+    absl::StatusOr<MapImportProgress> progress = absl::InternalError("nothing was sent");
+    for (std::size_t offset = 0; offset < file.size(); offset += kPiece) {
+      progress = transfer.Import(Piece(file, offset, kPiece), now_);
+      if (!progress.ok()) return progress;
+    }
+    return progress;
+  }
+  bool Any(const std::string& ending) const {
+    std::error_code error;
+    for (const auto& each : fs::directory_iterator(folder_, error)) {
+      if (each.path().extension() == ending) return true;
+    }
+    return false;
+  }
+
+  static constexpr std::size_t kPiece = MapTransfer::kMostTaken;
+  static inline const MapTransfer::Time now_ = std::chrono::steady_clock::now();
   fs::path folder_;
 };
 
@@ -150,6 +196,126 @@ TEST_F(MapShelfTest, AnIdLeadsNowhereElse) {
     EXPECT_EQ(shelf.Load(id).status().code(), absl::StatusCode::kInvalidArgument) << id;
     EXPECT_EQ(shelf.Remove(id).code(), absl::StatusCode::kInvalidArgument) << id;
   }
+}
+
+TEST_F(MapShelfTest, AFileGoesOutAndComesInElsewhereByteForByte) {
+  MapShelf shelf(folder_);
+  MapTransfer transfer(shelf);
+  const std::string file = LargeFile(kFirst);
+  ASSERT_GT(file.size(), 2 * MapTransfer::kMostSent);
+  const auto progress = ImportAll(transfer, file);
+  ASSERT_TRUE(progress.ok()) << progress.status();
+  ASSERT_TRUE(progress->whole.has_value());
+  EXPECT_EQ(progress->whole->name, "Küche");
+  EXPECT_EQ(progress->whole->landmarks, 2999U);
+  EXPECT_EQ(Read(kFirst), file);
+  EXPECT_EQ(fs::status(shelf.FileOf(kFirst)).permissions(),
+            fs::perms::owner_read | fs::perms::owner_write);
+
+  std::string out;
+  MapFileRequest request{.id = kFirst};
+  for (int piece = 0; piece == 0 || out.size() < file.size(); ++piece) {
+    const auto read = transfer.Read(request, now_);
+    ASSERT_TRUE(read.ok()) << read.status();
+    out += read->data;
+    request = {.id = kFirst, .offset = out.size(), .checksum = read->checksum};
+    // Another one in its place: what was begun goes on.
+    if (piece == 0) {
+      ASSERT_TRUE(Save(shelf, kFirst, 5).ok());
+    }
+  }
+  EXPECT_EQ(out, file);
+  request.checksum ^= 1;
+  EXPECT_EQ(transfer.Read(request, now_).status().code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(transfer.Read({.id = kSecond}, now_).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(MapShelfTest, WhatMustNotComeInIsRefusedAndLeavesNothing) {
+  MapShelf shelf(folder_);
+  MapTransfer transfer(shelf);
+  const std::string file = LargeFile(kFirst);
+  const auto refused = [&](std::string bytes, absl::StatusCode code, const char* words) {
+    const absl::Status status = ImportAll(transfer, bytes).status();
+    EXPECT_EQ(status.code(), code) << status;
+    EXPECT_THAT(std::string(status.message()), HasSubstr(words));
+    EXPECT_FALSE(Any(".part") || Any(".map")) << words;
+  };
+  std::string changed = file;
+  changed[file.size() - 5] ^= 1;
+  refused(changed, absl::StatusCode::kDataLoss, "file: is damaged");
+  changed = file;
+  changed[12] = 9;
+  refused(changed, absl::StatusCode::kDataLoss, "file: is of version 9");
+  refused(file.substr(0, file.size() - 1), absl::StatusCode::kDataLoss, "file: is damaged");
+  refused("P6 640 480 255", absl::StatusCode::kDataLoss, "file: is no map");
+
+  // On its way it became another.
+  ASSERT_TRUE(transfer.Import(Piece(file, 0, kPiece), now_).ok());
+  EXPECT_TRUE(Any(".part"));
+  MapImportPiece rest = Piece(file, kPiece, kPiece);
+  EXPECT_EQ(transfer.Import(Piece(file, 2 * kPiece, kPiece), now_).status().code(),
+            absl::StatusCode::kAborted)
+      << "not the one that is next";
+  rest.data[7] ^= 1;
+  absl::StatusOr<MapImportProgress> last = transfer.Import(rest, now_);
+  for (std::size_t at = 2 * kPiece; last.ok() && at < file.size(); at += kPiece) {
+    last = transfer.Import(Piece(file, at, kPiece), now_);
+  }
+  EXPECT_THAT(std::string(last.status().message()), HasSubstr("file_crc32"));
+  EXPECT_FALSE(Any(".part") || Any(".map"));
+
+  MapImportPiece huge = Piece(file, 0, kPiece);
+  huge.total = kMostMapBytes + 1;
+  EXPECT_THAT(std::string(transfer.Import(huge, now_).status().message()),
+              HasSubstr("total_bytes"));
+  huge = Piece(file, 0, kPiece);
+  huge.upload_id = "../../../../../../../etc/cron.d/xxxxx";
+  EXPECT_THAT(std::string(transfer.Import(huge, now_).status().message()), HasSubstr("upload_id"));
+
+  ASSERT_TRUE(ImportAll(transfer, file).ok());
+  const absl::Status again = transfer.Import(Piece(file, 0, kPiece), now_).status();
+  EXPECT_EQ(again.code(), absl::StatusCode::kAlreadyExists) << "at its first piece";
+  EXPECT_THAT(std::string(again.message()), HasSubstr(kFirst));
+  EXPECT_EQ(Read(kFirst), file);
+}
+
+TEST_F(MapShelfTest, WhoDoesNotGoOnMakesRoom) {
+  MapShelf shelf(folder_);
+  {
+    MapTransfer transfer(shelf);
+    const std::string file = LargeFile(kFirst);
+    const auto begin = [&](char first, MapTransfer::Time when) {
+      MapImportPiece piece = Piece(file, 0, kPiece);
+      piece.upload_id[0] = first;
+      return transfer.Import(piece, when).status();
+    };
+    for (const char first : {'a', 'b', 'c', 'd'}) EXPECT_TRUE(begin(first, now_).ok());
+    EXPECT_EQ(begin('e', now_).code(), absl::StatusCode::kResourceExhausted);
+    EXPECT_TRUE(begin('d', now_).ok()) << "anew";
+    EXPECT_TRUE(begin('e', now_ + MapTransfer::kPatience + std::chrono::seconds(1)).ok());
+    EXPECT_TRUE(Any(".part"));
+  }
+  EXPECT_FALSE(Any(".part"));
+  // What a killed server left goes with the next upload.
+  Write("killed", "");
+  fs::rename(folder_ / "killed.map", folder_ / "killed.part");
+  MapTransfer transfer(shelf);
+  ASSERT_TRUE(ImportAll(transfer, LargeFile(kFirst)).ok());
+  EXPECT_FALSE(Any(".part"));
+}
+
+TEST_F(MapShelfTest, ANameThatNobodyCanShowIsDamage) {
+  for (const std::string& name : {std::string("\xff"), std::string("\xc3"), std::string(201, 'a'),
+                                  std::string("\xed\xa0\x80"), std::string("\xc0\xaf")}) {
+    KeptMapFacts facts;
+    facts.id = facts.world = kFirst;
+    facts.name = name;
+    EXPECT_FALSE(DecodeMapFacts("file", EncodeMapFile(facts, SmallMap())).ok()) << name;
+  }
+  KeptMapFacts facts;
+  facts.id = facts.world = kFirst;
+  facts.name = "Küche 厨房 \xf0\x9f\x94\xa7";
+  EXPECT_TRUE(DecodeMapFacts("file", EncodeMapFile(facts, SmallMap())).ok());
 }
 
 }  // namespace
