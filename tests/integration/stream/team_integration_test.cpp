@@ -65,7 +65,9 @@ class Wearer {
   Engine& engine() { return *engine_; }
   int frames() const { return frames_; }
   void Join(const Wearer& other) {
-    link_ = std::make_unique<TeamLink>(TeamLinkOptions{.address = other.address()}, *team_);
+    TeamLinkOptions options;
+    options.address = other.address();
+    link_ = std::make_unique<TeamLink>(std::move(options), *team_);
   }
   void Leave() { link_.reset(); }
 
