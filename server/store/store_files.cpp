@@ -33,7 +33,8 @@ bool HoldsOnlyTheStore(const fs::path& directory) {
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename().string();
     const bool ours = absl::StartsWith(name, "annotations.") || absl::StartsWith(name, "access.") ||
-                      name == "tls" || name == "owner.json" || name == "maps" || name == "recordings";
+                      name == "tls" || name == "owner.json" || name == "maps" ||
+                      name == "recordings";
     if (!ours) return false;
   }
   return !error;
