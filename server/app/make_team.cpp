@@ -1,5 +1,6 @@
 #include "server/app/make_team.hpp"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 #include <unistd.h>
@@ -80,6 +81,10 @@ absl::StatusOr<std::optional<TeamLinkOptions>> LinkOf(const ServerConfig& config
     absl::StatusOr<std::string> root =
         ReadRegularFile(config.team_trust, kRootBytes, "--team-trust");
     if (!root.ok()) return root.status();
+    if (!absl::StrContains(*root, "BEGIN CERTIFICATE")) {  // without a root the way would be plain
+      return absl::InvalidArgumentError(absl::StrCat("--team-trust ", config.team_trust.string(),
+                                                     ": no PEM certificate is in it"));
+    }
     options.root_pem = *std::move(root);
   }
   return options;
