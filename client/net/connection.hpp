@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client/net/scene_types.hpp"
+#include "client/net/surface_types.hpp"
 #include "client/net/types.hpp"
 #include "shared/scene/annotation.hpp"
 
@@ -119,6 +120,9 @@ class Connection {
   /// Lets it go where `object` says, after a push if there is one, lowered until it rests.
   absl::StatusOr<PlacedThing> PlaceThing(const SceneObject& object,
                                          const std::optional<Eigen::Vector3d>& push);
+  /// What is newer than `version` of the place's surfaces; `max_bytes`: 4 096 to 524 288.
+  absl::StatusOr<SurfacePiece> GetSurface(std::uint64_t edition, std::uint64_t version,
+                                          std::uint32_t max_bytes);
   /// What was undone or redone, in words. Acts on the person's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();

@@ -21,6 +21,7 @@
 #include "saccade/v1/replay.grpc.pb.h"
 #include "saccade/v1/scene.grpc.pb.h"
 #include "saccade/v1/session.grpc.pb.h"
+#include "saccade/v1/surface.grpc.pb.h"
 #include "saccade/v1/talk.grpc.pb.h"
 
 namespace saccade::net {
@@ -40,6 +41,7 @@ class Connection::Impl {
         gaze_(v1::GazeService::NewStub(channel_)),
         pointer_(v1::PointerService::NewStub(channel_)),
         scene_(v1::SceneService::NewStub(channel_)),
+        surface_(v1::SurfaceService::NewStub(channel_)),
         talk_(v1::TalkService::NewStub(channel_)),
         recording_(v1::RecordingService::NewStub(channel_)),
         replay_(v1::ReplayService::NewStub(channel_)) {}
@@ -133,6 +135,7 @@ class Connection::Impl {
   const std::unique_ptr<v1::GazeService::Stub> gaze_;
   const std::unique_ptr<v1::PointerService::Stub> pointer_;
   const std::unique_ptr<v1::SceneService::Stub> scene_;
+  const std::unique_ptr<v1::SurfaceService::Stub> surface_;
   const std::unique_ptr<v1::TalkService::Stub> talk_;
   const std::unique_ptr<v1::RecordingService::Stub> recording_;
   const std::unique_ptr<v1::ReplayService::Stub> replay_;

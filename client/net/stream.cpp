@@ -100,7 +100,7 @@ class Stream::Impl {
     for (const v1::Topic topic :
          {v1::TOPIC_POSE, v1::TOPIC_MAP, v1::TOPIC_VIDEO, v1::TOPIC_ANNOTATION, v1::TOPIC_GAZE,
           v1::TOPIC_PRESENCE, v1::TOPIC_STATISTICS, v1::TOPIC_POINTER, v1::TOPIC_CHAT,
-          v1::TOPIC_PICTURE_PAUSE, v1::TOPIC_SCENE}) {
+          v1::TOPIC_PICTURE_PAUSE, v1::TOPIC_SCENE, v1::TOPIC_SURFACE}) {
       request.add_topics(topic);
     }
     if (voice_) request.add_topics(v1::TOPIC_VOICE);
@@ -174,6 +174,9 @@ class Stream::Impl {
         return std::optional<StreamEvent>(net::FromProto(message.picture_pause()));
       case v1::Event::kScene:
         return Wrap(net::FromProto(message.scene()));
+      case v1::Event::kSurface:
+        return std::optional<StreamEvent>(
+            SurfaceNews{message.surface().edition(), message.surface().version()});
       case v1::Event::kStatistics:
         return std::optional<StreamEvent>(net::FromProto(message.statistics()));
       case v1::Event::kPresence:

@@ -12,6 +12,7 @@
 
 #include "client/net/connection.hpp"
 #include "client/net/scene_types.hpp"
+#include "client/net/surface_types.hpp"
 #include "client/net/types.hpp"
 #include "shared/audio/voice_frame.hpp"
 #include "shared/scene/marker_pose.hpp"
@@ -85,7 +86,7 @@ struct VoiceNews {
 using StreamEvent =
     std::variant<MapSnapshot, CodedPicture, MapChange, AnnotationChange, GazeSnapshot, Statistics,
                  Presence, std::vector<PointerNews>, std::vector<ChatMessage>, PicturePause,
-                 SceneChange, VoiceNews, SourceEnd>;
+                 SceneChange, SurfaceNews, VoiceNews, SourceEnd>;
 
 /// Times of one Ping [ns]: `sent` and `answered` on this machine's clock, the others on the
 /// server's.

@@ -11,6 +11,7 @@
 #include "client/session/clock.hpp"
 #include "client/session/pointer_book.hpp"
 #include "client/session/scene_book.hpp"
+#include "client/session/surface_book.hpp"
 
 namespace saccade::session {
 
@@ -56,6 +57,7 @@ class State {
   PointerBook pointers;
   AnnotationBook annotations;
   SceneBook scene;
+  SurfaceBook surface;
   ClockOffset clock;
   // The map; `map_version` rises with every change of it.
   std::map<FeatureId, FeatureSnapshot> features;

@@ -27,7 +27,12 @@ bool IsRefusal(const absl::Status& status) {
 }  // namespace
 
 Session::Threads::Threads(SessionOptions options, PictureSink& pictures, std::function<void()> wake)
-    : options_(std::move(options)), pictures_(pictures), wake_(std::move(wake)) {
+    : options_(std::move(options)),
+      pictures_(pictures),
+      wake_(std::move(wake)),
+      surfaces_([this](net::SurfacePiece piece) {
+        Post([piece = std::move(piece)](State& state) { state.surface.Take(piece); });
+      }) {
   streaming_ = std::jthread([this](std::stop_token stop) { RunStream(stop); });
   keeping_ = std::jthread([this](std::stop_token stop) { RunKeeper(stop); });
   editing_ = std::jthread([this](std::stop_token stop) { RunEdits(stop); });
@@ -149,6 +154,7 @@ absl::Status Session::Threads::RunOnce(std::stop_token stop, bool& was_live) {
     pinged_ns_ = 0;
   }
   pictures_.Reset();
+  surfaces_.Connect(connection);
   Post([id = *id, joined = (*joining)->joined()](State& state) { state.Begin(id, joined); });
   return stream->Read([&](std::uint64_t sequence, std::optional<net::StreamEvent> event) {
     // Once the stream is open: between its first word and this answer nothing falls.
@@ -158,6 +164,8 @@ absl::Status Session::Threads::RunOnce(std::stop_token stop, bool& was_live) {
       pictures_.Push(std::get<net::CodedPicture>(*std::move(event)));
     } else if (event && std::holds_alternative<net::VoiceNews>(*event)) {
       if (options_.on_voice) options_.on_voice(std::get<net::VoiceNews>(*event));
+    } else if (event && std::holds_alternative<net::SurfaceNews>(*event)) {
+      surfaces_.Tell(std::get<net::SurfaceNews>(*event));
     } else if (event) {
       if (const auto* scene = std::get_if<net::SceneChange>(&*event)) {
         AskForModels(scene->added_models);

@@ -11,6 +11,7 @@
 
 #include "client/session/acknowledger.hpp"
 #include "client/session/session.hpp"
+#include "client/session/surface_fetcher.hpp"
 
 namespace saccade::session {
 
@@ -56,6 +57,7 @@ class Session::Threads {
   std::shared_ptr<net::Stream> stream_;            // the one that is read
   std::optional<Acknowledger> acknowledger_;
   Timestamp heard_ns_ = 0, pinged_ns_ = 0;
+  SurfaceFetcher surfaces_;
   std::set<std::string> models_;  // fetched; the thread of edits
   std::string ended_;             // why we ended the stream ourselves
   bool listens_ = false;

@@ -81,6 +81,9 @@ absl::StatusOr<std::unique_ptr<MapScene>> MapScene::Create(const GlFunctions& gl
   if (!textured.ok()) return textured.status();
   scene->plain_ = *std::move(plain);
   scene->textured_ = *std::move(textured);
+  auto surfaces = SurfaceLayer::Create(gl);
+  if (!surfaces.ok()) return surfaces.status();
+  scene->surfaces_ = *std::move(surfaces);
   return scene;
 }
 
@@ -110,6 +113,7 @@ void MapScene::BuildGrid() {
 }
 
 void MapScene::Update(const session::State& state) {
+  surfaces_->Update(state.surface);
   if (state.map_version != map_version_) {
     map_version_ = state.map_version;
     Lines dots, ends;
@@ -202,6 +206,7 @@ void MapScene::Draw(const tools::View& eye, const Eigen::Vector4i& viewport, dou
   gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   const Eigen::Matrix4f clip_from_camera = ClipFromCamera(*eye.camera, 0.01, 1000);
   const Eigen::Matrix4f clip_from_world = clip_from_camera * MatrixOf(eye.camera_from_world);
+  surfaces_->Draw(clip_from_world, eye.world_from_camera.translation);
   plain_->Use();
   plain_->Set("clip_from_model", clip_from_world);
   plain_->Set("point_px", point_px);

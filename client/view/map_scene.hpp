@@ -8,6 +8,7 @@
 
 #include "client/session/state.hpp"
 #include "client/tools/view.hpp"
+#include "client/view/surface_layer.hpp"
 #include "client/view/thing_layer.hpp"
 #include "shared/render/gl_functions.hpp"
 #include "shared/render/mesh.hpp"
@@ -16,9 +17,9 @@
 
 namespace saccade::view {
 
-/// The 3D map without marks: features in their colours with a line one sigma either way along their
-/// worst axis, the wearer's camera with its live picture, its path, a ground grid. Lives on the
-/// thread of its OpenGL context, which must be current.
+/// The 3D map without marks: the place's surfaces, features in their colours with a line one sigma
+/// either way along their worst axis, the wearer's camera with its live picture, its path, a ground
+/// grid. Lives on the thread of its OpenGL context, which must be current.
 class MapScene {
  public:
   static absl::StatusOr<std::unique_ptr<MapScene>> Create(const GlFunctions& gl);
@@ -42,6 +43,7 @@ class MapScene {
 
   const GlFunctions& gl_;
   std::unique_ptr<Program> plain_, textured_;
+  std::unique_ptr<SurfaceLayer> surfaces_;
   Mesh grid_, points_, sigmas_, path_, frustum_lines_, frustum_picture_;
   const Texture* picture_ = nullptr;
   std::shared_ptr<const CameraModel> camera_;

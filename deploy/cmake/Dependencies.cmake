@@ -43,6 +43,7 @@ endforeach()
 # Models (GLB), and what they touch.
 pkg_check_modules(TinyGltf REQUIRED IMPORTED_TARGET tinygltf)
 find_package(fcl REQUIRED)
+find_package(meshoptimizer CONFIG REQUIRED)  # surfaces on their way to people
 # Square markers.
 find_package(apriltag CONFIG REQUIRED)
 pkg_check_modules(Cairo REQUIRED IMPORTED_TARGET cairo cairo-pdf cairo-svg)  # sheets of them

@@ -153,7 +153,7 @@ std::vector<AnchorMoved> AnchorManager::Resolve(std::shared_ptr<const MapSnapsho
   const bool corrected = newest_ && newest_->snapshot().map_revision != snapshot->map_revision;
   scale_.Observe(*snapshot, camera.RadiansPerPixel());
   trail_.Add(*snapshot);
-  newest_ = std::make_shared<const MapView>(std::move(snapshot), &scale_, &trail_);
+  newest_ = std::make_shared<const MapView>(std::move(snapshot), &scale_, &trail_, surface_);
   camera_ = camera;
   std::vector<AnchorMoved> moved;
   int selections_left = kSelectionsPerFrame;

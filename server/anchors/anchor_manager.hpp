@@ -87,6 +87,9 @@ class AnchorManager {
   /// See AnnotationBook::SetWorld.
   void SetWorld(std::string world) { options_.map_key = std::move(world); }
 
+  /// From the next Resolve on.
+  void SetSurface(std::shared_ptr<const SurfaceSnapshot> surface) { surface_ = std::move(surface); }
+
   /// Once per frame: recomputes every anchor from the newest map and publishes. Returns the jumps.
   std::vector<AnchorMoved> Resolve(std::shared_ptr<const MapSnapshot> snapshot,
                                    const CameraModel& camera);
@@ -145,7 +148,8 @@ class AnchorManager {
   SeedFeatureFunction seed_;
   ScaleChain scale_;
   PoseTrail trail_;
-  std::shared_ptr<const MapView> newest_;  // null before the first Resolve
+  std::shared_ptr<const SurfaceSnapshot> surface_;  // null: none is known
+  std::shared_ptr<const MapView> newest_;           // null before the first Resolve
   std::optional<CameraModel> camera_;
   std::vector<AnchorRecord> records_;  // oldest first
   EditHistories histories_;

@@ -231,8 +231,8 @@ void ForgetSeed(AnchorPlace& place) {
 }  // namespace
 
 MapView::MapView(std::shared_ptr<const MapSnapshot> snapshot, const ScaleChain* scale,
-                 const PoseTrail* trail)
-    : snapshot_(std::move(snapshot)), scale_(scale), trail_(trail) {
+                 const PoseTrail* trail, std::shared_ptr<const SurfaceSnapshot> surface)
+    : snapshot_(std::move(snapshot)), scale_(scale), trail_(trail), surface_(std::move(surface)) {
   const std::vector<FeatureSnapshot>& features = snapshot_->features;
   for (std::size_t k = 0; k < features.size(); ++k) {
     if (k == 0 || features[k].id <= features[k - 1].id) stretches_.push_back(k);

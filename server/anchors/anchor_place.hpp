@@ -12,6 +12,7 @@
 #include "shared/geometry/rigid3.hpp"
 #include "shared/scene/annotation.hpp"
 #include "shared/scene/map_snapshot.hpp"
+#include "shared/scene/surface_snapshot.hpp"
 
 namespace saccade {
 
@@ -19,13 +20,19 @@ namespace saccade {
 class MapView {
  public:
   /// `scale`: how surely its parts have one scale; null: surely. `trail`: of the frames before;
-  /// null: not known. Both outlive the view.
+  /// null: not known. Both outlive the view. `surface`: as published last.
   explicit MapView(std::shared_ptr<const MapSnapshot> snapshot, const ScaleChain* scale = nullptr,
-                   const PoseTrail* trail = nullptr);
+                   const PoseTrail* trail = nullptr,
+                   std::shared_ptr<const SurfaceSnapshot> surface = nullptr);
   const MapSnapshot& snapshot() const { return *snapshot_; }
   /// Null if the map does not hold it (any more).
   const FeatureSnapshot* Find(FeatureId id) const;
   const PoseTrail* trail() const { return trail_; }
+  /// Of the place as this map has it; null: none is known.
+  const SurfaceSnapshot* surface() const {
+    const bool same = surface_ && surface_->generation == snapshot_->map_generation;
+    return same ? surface_.get() : nullptr;
+  }
   /// Variance of the logarithm of the scale around a feature.
   double ScaleVariance(FeatureId id) const { return scale_ ? scale_->Of(id) : 0.0; }
 
@@ -33,6 +40,7 @@ class MapView {
   std::shared_ptr<const MapSnapshot> snapshot_;
   const ScaleChain* scale_;
   const PoseTrail* trail_;
+  std::shared_ptr<const SurfaceSnapshot> surface_;
   /// Begins of the stretches of rising ids: the tracker's lists are two. No index of all features
   /// for every frame: most of a large map rests, and few are asked for.
   std::vector<std::size_t> stretches_;

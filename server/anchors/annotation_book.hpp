@@ -49,6 +49,11 @@ class AnnotationBook {
   std::vector<AnchorMoved> OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
                                       const CameraModel& camera);
 
+  /// Of the place, from the next snapshot on.
+  void SetSurface(std::shared_ptr<const SurfaceSnapshot> surface) {
+    anchors_.SetSurface(std::move(surface));
+  }
+
   /// Whose coordinates the map has from the next snapshot on (UUID): what was placed in it, in this
   /// run or another, is where it was.
   void SetWorld(std::string world) { anchors_.SetWorld(std::move(world)); }

@@ -10,6 +10,7 @@
 
 #include "server/anchors/local_surface.hpp"
 #include "server/anchors/rigid_fit.hpp"
+#include "server/anchors/surface_look.hpp"
 #include "shared/scene/limits.hpp"
 
 namespace saccade {
@@ -77,6 +78,28 @@ absl::Status NoDepth() {
       "again");
 }
 
+/// What surfaces have on the ray, or, where that is a hole, around it: as further samples.
+std::optional<SurfaceLook> LookAt(const MapView& newest, const Rigid3& ray_from_world,
+                                  double radians_per_px, std::vector<SurfaceSample>& samples) {
+  if (newest.surface() == nullptr) return std::nullopt;
+  const Rigid3 world_from_ray = ray_from_world.Inverse();
+  std::optional<SurfaceLook> look =
+      LookAtSurface(*newest.surface(), world_from_ray.translation,
+                    world_from_ray.rotation * Eigen::Vector3d::UnitZ(), radians_per_px);
+  if (look) return look;
+  const auto around = SurfaceAround(*newest.surface(), ray_from_world, radians_per_px);
+  samples.insert(samples.end(), around.begin(), around.end());
+  return std::nullopt;
+}
+
+/// Where no feature is in view.
+SurfaceDepth GuessOf(const SurfaceLook& look) {
+  SurfaceDepth depth;
+  depth.depth_m = look.range_m;
+  depth.sigma_m = look.range_m;
+  return depth;
+}
+
 /// The features that were in view, as the newest map has them, seen from the clicked frame.
 std::vector<SurfaceSample> VisibleSamples(const MapSnapshot& past, const MapView& newest,
                                           const Rigid3& newest_from_past,
@@ -127,10 +150,13 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
   const Rigid3 ray_from_world = RayFromWorld(world_from_camera.translation, ray);
 
   std::vector<FeatureId> ids;
-  const std::vector<SurfaceSample> samples =
+  std::vector<SurfaceSample> samples =
       VisibleSamples(then, newest, cast->newest_from_past, ray_from_world, ids);
+  const std::optional<SurfaceLook> look =
+      LookAt(newest, ray_from_world, camera.RadiansPerPixel(), samples);
   std::optional<SurfaceDepth> depth =
       EstimateDepth(samples, camera.RadiansPerPixel(), newest.snapshot().metric, options);
+  if (!depth && look) depth = GuessOf(*look);
   if (!depth) return NoDepth();
 
   ResolvedTarget resolved;
@@ -138,6 +164,7 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
     resolved.doubt = AskThePicture(cast->past, target.pixel, newest.snapshot().frame_id, frames,
                                    newest.trail(), *depth);
   }
+  if (look) TakeSurface(*look, *depth, resolved.doubt);
   resolved.method = depth->method;
   resolved.distance_m = depth->depth_m;
   resolved.point_in_world = world_from_camera.translation + depth->depth_m * ray;
@@ -148,10 +175,13 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
         depth->depth_m * std::sqrt(then.pose_covariance.diagonal().tail<3>().maxCoeff()));
   }
   resolved.covariance_in_world = AlongAndAcross(ray, depth->sigma_m, across);
-  if (depth->at_feature && newest.Find(ids[*depth->at_feature])) {
+  if (depth->at_feature && *depth->at_feature < ids.size() &&
+      newest.Find(ids[*depth->at_feature])) {
     resolved.feature = ids[*depth->at_feature];
   }
-  resolved.normal_in_world = ray_from_world.rotation.conjugate() * depth->normal_in_ray;
+  resolved.normal_in_world =
+      look ? look->normal_in_world
+           : Eigen::Vector3d(ray_from_world.rotation.conjugate() * depth->normal_in_ray);
   resolved.view = ResolvedTarget::View{std::move(cast->past), world_from_camera, target.pixel,
                                        depth->depth_m, depth->sigma_m};
   return resolved;
@@ -208,16 +238,23 @@ absl::StatusOr<ResolvedTarget> ResolveRay(const RayTarget& target, const MapView
     samples.push_back(sample);
     ids.push_back(feature.id);
   }
-  const std::optional<SurfaceDepth> depth =
+  const std::optional<SurfaceLook> look = LookAt(newest, ray_from_world, kRayRadiansPerPx, samples);
+  std::optional<SurfaceDepth> depth =
       EstimateDepth(samples, kRayRadiansPerPx, newest.snapshot().metric, options);
+  if (!depth && look) depth = GuessOf(*look);
   if (!depth) return NoDepth();
   ResolvedTarget resolved;
+  if (look) TakeSurface(*look, *depth, resolved.doubt);
   resolved.method = depth->method;
   resolved.point_in_world = target.origin_in_world + depth->depth_m * ray;
   resolved.covariance_in_world = AlongAndAcross(
       ray, depth->sigma_m, options.click_sigma_px * kRayRadiansPerPx * depth->depth_m);
-  if (depth->at_feature) resolved.feature = ids[*depth->at_feature];
-  resolved.normal_in_world = ray_from_world.rotation.conjugate() * depth->normal_in_ray;
+  if (depth->at_feature && *depth->at_feature < ids.size()) {
+    resolved.feature = ids[*depth->at_feature];
+  }
+  resolved.normal_in_world =
+      look ? look->normal_in_world
+           : Eigen::Vector3d(ray_from_world.rotation.conjugate() * depth->normal_in_ray);
   return resolved;
 }
 

@@ -37,8 +37,10 @@ Eigen::Vector3d OnSurface(const Eigen::Vector3d& origin, const Eigen::Vector3d& 
 
 }  // namespace
 
-void PointerPlacer::OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot) {
-  auto view = std::make_shared<const MapView>(std::move(snapshot));
+void PointerPlacer::OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
+                               std::shared_ptr<const SurfaceSnapshot> surface) {
+  auto view =
+      std::make_shared<const MapView>(std::move(snapshot), nullptr, nullptr, std::move(surface));
   const std::lock_guard lock(mutex_);
   if (newest_ && view->snapshot().frame_id < newest_->snapshot().frame_id) found_.clear();
   newest_ = std::move(view);  // a source that started again gives ids anew

@@ -27,7 +27,8 @@ class PointerPlacer {
       : frames_(std::move(frames)), options_(std::move(options)) {}
 
   /// The newest map.
-  void OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot);
+  void OnSnapshot(std::shared_ptr<const MapSnapshot> snapshot,
+                  std::shared_ptr<const SurfaceSnapshot> surface = nullptr);
 
   /// Errors as AnchorManager::Create, naming points[i].
   absl::StatusOr<std::vector<Eigen::Vector3d>> Locate(

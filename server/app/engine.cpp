@@ -109,6 +109,10 @@ void Engine::Start() {
   });
   source_thread_ = std::jthread([this](std::stop_token stop) { RunSource(stop); });
   clock_thread_ = std::jthread([this](std::stop_token stop) { RunClock(stop); });
+  if (options_.surfaces) {
+    options_.surfaces->Start(
+        [this](const std::shared_ptr<const SurfaceSnapshot>& now) { sink_.OnSurface(now); });
+  }
 }
 
 void Engine::Stop() {
@@ -119,6 +123,7 @@ void Engine::Stop() {
   if (options_.calibration) options_.calibration->Stop();
   pictures_->Stop();
   scene_->Stop();
+  if (options_.surfaces) options_.surfaces->Stop();
   source_->Stop();           // its next frame may not be due for long
   if (gaze_) gaze_->Stop();  // the head stops now, however long the frame takes that is tracked
   for (const Command& command : inbox_.Close()) {
@@ -185,6 +190,7 @@ void Engine::Track(Frame frame) {
   wearable_->tracker().SetSight(scene_->sight());
   wearable_->tracker().SetCarried(scene_->carried());
   carried_.SetWanted(scene_->carried());
+  wearable_->SetSurface(surface());
   const WearableStep& step = wearable_->Step(std::move(frame));
   TrackedFrame next{.frame = step.frame, .tracked = {}};
   TrackedEvent& tracked = next.tracked;
@@ -197,6 +203,10 @@ void Engine::Track(Frame frame) {
   scene_layer_.SetLight(tracked.light);
   last_ = std::move(next);
   if (options_.calibration) options_.calibration->OnFrame(step.frame);
+  // What nobody may see is in no surface either.
+  if (options_.surfaces && pictures_->MayShow(step.frame->id).ok()) {
+    options_.surfaces->OnFrame(step.frame, wearable_->tracker().keyframes());
+  }
   for (const AnchorMoved& moved : step.moved) {
     Log(absl::StrFormat("anchor %s moved %.1f mm: %s", moved.id, 1e3 * moved.delta_in_world.norm(),
                         moved.cause));

@@ -17,6 +17,7 @@
 #include "server/app/picture_switch.hpp"
 #include "server/app/scene_keeper.hpp"
 #include "server/app/scene_layer.hpp"
+#include "server/app/surface_runner.hpp"
 #include "server/app/view_encoder.hpp"
 #include "server/capture/frame_source.hpp"
 #include "server/overlay/overlay.hpp"
@@ -45,6 +46,7 @@ struct EngineOptions {
   std::shared_ptr<PictureSwitch> pictures;       // null: one that keeps nothing
   std::shared_ptr<SceneKeeper> scene;            // likewise
   std::shared_ptr<MapKeeper> maps;               // null: maps end with the run
+  std::shared_ptr<SurfaceRunner> surfaces;       // null: none are made
   std::shared_ptr<CalibrationDesk> calibration;  // null: nobody calibrates the camera
   GlBackend gl = GlBackend::kOsmesa;
 };
@@ -55,6 +57,7 @@ struct EngineOptions {
 ///   tracker thread  the wearable: commands, frames; publishes to the sink
 ///   gaze thread     where there is a mount: steers it
 ///   view threads    one per view: draw, code
+///   surface thread  where there are surfaces: SurfaceRunner
 ///   still thread    PNG for GetFrame
 ///   clock thread    statistics once a second
 class Engine : public Backend {
@@ -96,6 +99,9 @@ class Engine : public Backend {
   std::shared_ptr<const PicturePause> picture_pause() const override;
   std::shared_ptr<const Scene> scene() const override;
   SceneLight light() const override { return scene_layer_.light(); }
+  std::shared_ptr<const SurfaceSnapshot> surface() const override {
+    return options_.surfaces ? options_.surfaces->newest() : nullptr;
+  }
   absl::Status SubmitScene(SceneCommand command) override;
   KeptMaps* maps() override { return options_.maps.get(); }
   /// Before Start(): the first frames are looked at for it. Errors as FrameTracker::Resume.

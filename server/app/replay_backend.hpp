@@ -22,6 +22,7 @@ class ReplayBackend final : public Backend {
     return replayer_.annotations();
   }
   std::shared_ptr<const GazeSnapshot> gaze() const override { return replayer_.gaze(); }
+  std::shared_ptr<const SurfaceSnapshot> surface() const override { return replayer_.surface(); }
   absl::Status SubmitGaze(GazeCommand command) override;
   void GetStill(std::optional<FrameId> frame_id, VideoView view, Done<Still> done) override;
   absl::StatusOr<std::vector<Eigen::Vector3d>> LocatePointer(

@@ -39,7 +39,7 @@ struct Raw {
   std::map<std::string, AccessRole> client_roles;
   bool insecure = false, tls_required = false, auth_required = false, waiting_room = false;
   bool overlay_dots = false, overlay_axes = false, overlay_status = false;
-  double run_for_s = -1.0;
+  double run_for_s = -1.0, surface_cores = 0.5;
   std::int64_t bit_rate = 0;
   std::int64_t seed = 1;
   std::int64_t record_file_mb = 1024, record_file_s = 600, record_keep_free_mb = 1024;
@@ -78,6 +78,8 @@ const std::vector<Setting>& Settings() {
       {"map", "--map", &Raw::map,
        "what was mapped before: last: looked for first | new: kept, not looked for | ID of one | "
        "none: neither (saccade maps list)"},
+      {"surfaces.cores", "--surface-cores", &Raw::surface_cores,
+       "how much of one processor surfaces of the place may take, 0 (none are made) to 1"},
       {nullptr, "--run-for", &Raw::run_for_s, "end after so many seconds"},
       {nullptr, "--sim-truth", &Raw::sim_truth, "JSON lines of the simulator's truth"},
       {nullptr, "--record", &Raw::record,
@@ -389,6 +391,10 @@ absl::StatusOr<ServerConfig> Check(const Raw& raw) {
   if (config.data_dir.empty()) return Bad("--data-dir is missing, and HOME is not set");
   config.camera_file = raw.camera;
   if (absl::Status record = CheckRecord(raw, config); !record.ok()) return record;
+  if (!(raw.surface_cores >= 0.0 && raw.surface_cores <= 1.0)) {
+    return Bad(absl::StrCat("--surface-cores: ", raw.surface_cores, ": give 0 to 1"));
+  }
+  config.surface_cores = raw.surface_cores;
   config.insecure = raw.insecure;
   if (absl::Status addresses = CheckAddresses(raw, config); !addresses.ok()) return addresses;
   if (absl::Status identity = CheckIdentity(raw, config); !identity.ok()) return identity;

@@ -60,6 +60,7 @@ struct ServerConfig {
   std::filesystem::path record_dir;
   bool record = false;
   std::int64_t record_file_mb = 1024, record_file_s = 600, record_keep_free_mb = 1024;  // [record]
+  double surface_cores = 0.5;  // of one processor at most; 0: no surfaces
   // Only in the file: reasons to change them are rare.
   int video_bit_rate_bit_s = 0;    // video.bit_rate_bit_s; 0: by picture size
   LimitSettings limits;            // [limits]

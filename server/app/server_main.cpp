@@ -140,6 +140,11 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const ServerConfig& config, E
   ApplyLimits(config, options.anchors);
   options.mount = opened->mount.mount;
   options.crop = opened->mount.crop;
+  if (config.surface_cores > 0.0) {
+    auto surfaces = SurfaceRunner::Create({.surface = {}, .most_cores = config.surface_cores});
+    if (!surfaces.ok()) return surfaces.status();
+    options.surfaces = *std::move(surfaces);
+  }
   std::shared_ptr<MapKeeper> maps;
   if (config.map != "none") {
     maps = std::make_shared<MapKeeper>(MapKeeperOptions{.directory = config.data_dir / "maps"});

@@ -11,6 +11,7 @@
 
 #include "server/eval/commands.hpp"
 #include "server/eval/markers/marker_flags.hpp"
+#include "server/eval/surface/clicks_command.hpp"
 #include "server/eval/surface/surface_command.hpp"
 #include "server/eval/team/team_command.hpp"
 #include "server/eval/team/team_settings.hpp"
@@ -387,6 +388,8 @@ int Main(int argc, char** argv) {
   AddFigures(app, figures);
   SurfaceArguments surface;
   AddSurface(app, surface);
+  ClicksArguments clicks;
+  AddClicks(app, clicks);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -410,6 +413,7 @@ int Main(int argc, char** argv) {
   if (app.got_subcommand("figures")) status = FiguresCommand(figures);
   if (app.got_subcommand("occlusion")) status = OcclusionCommand(occlusion);
   if (app.got_subcommand("surface")) status = SurfaceCommand(surface);
+  if (app.got_subcommand("clicks")) status = ClicksCommand(clicks);
   if (app.got_subcommand("replay")) status = ReplayCommand(replay);
   if (app.got_subcommand("team")) status = TeamCommand(team);
   return status.ok() ? 0 : Fail(status);

@@ -46,6 +46,8 @@ constexpr auto kTable = std::to_array<RoleRow>({
     {"SceneService/UploadModel", kAnnotator},
     {"SceneService/RegisterObject", kAnnotator},
 
+    {"SurfaceService/Get", kViewer},
+
     {"CalibrationService/GetCalibration", kViewer},
     {"CalibrationService/GetCalibrationFile", kViewer},
     {"CalibrationService/StartCalibration", kPilot},

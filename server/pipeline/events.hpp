@@ -12,6 +12,7 @@
 #include "shared/scene/marker_pose.hpp"
 #include "shared/scene/scene_light.hpp"
 #include "shared/scene/scene_object.hpp"
+#include "shared/scene/surface_snapshot.hpp"
 #include "shared/time/timestamp.hpp"
 
 namespace saccade {
@@ -81,6 +82,8 @@ class EventSink {
   virtual void OnPicturePause(const std::shared_ptr<const PicturePause>& state) = 0;
   /// After every change of the scene, in order.
   virtual void OnScene(const std::shared_ptr<const Scene>& scene) = 0;
+  /// Some of it is new, or all.
+  virtual void OnSurface(const std::shared_ptr<const SurfaceSnapshot>& surface) = 0;
 };
 
 }  // namespace saccade

@@ -92,6 +92,7 @@ EventWriter::EventWriter(std::unique_ptr<McapWriter> mcap, const RecordedFrom& f
   channels_->Add<v1::ChatEvent>("/saccade/chat");
   channels_->Add<v1::PicturePause>("/saccade/picture_pause");
   channels_->Add<v1::SceneEvent>("/saccade/scene");
+  channels_->Add<v1::GetSurfaceResponse>("/saccade/surface");
 }
 
 EventWriter::~EventWriter() = default;
@@ -210,6 +211,10 @@ absl::Status EventWriter::WriteMap(const v1::MapDelta& map, Timestamp time_ns) {
   return written;
 }
 
+absl::Status EventWriter::Write(const v1::GetSurfaceResponse& surface, Timestamp now_ns) {
+  return channels_->Write("/saccade/surface", now_ns + unix_minus_monotonic_ns_, surface);
+}
+
 absl::Status EventWriter::Write(const v1::Event& event, Timestamp came_ns) {
   const Timestamp time_ns = came_ns + unix_minus_monotonic_ns_;
   switch (event.event_case()) {
@@ -237,7 +242,8 @@ absl::Status EventWriter::Write(const v1::Event& event, Timestamp came_ns) {
       return channels_->Write("/saccade/picture_pause", time_ns, event.picture_pause());
     case v1::Event::kScene:
       return channels_->Write("/saccade/scene", time_ns, event.scene());
-    case v1::Event::kVoice:  // kept nowhere
+    case v1::Event::kSurface:  // says only that there is something new: SurfaceRounds
+    case v1::Event::kVoice:    // kept nowhere
     case v1::Event::EVENT_NOT_SET:
       break;
   }

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "saccade/v1/session.pb.h"
+#include "saccade/v1/surface.pb.h"
 #include "server/record/mcap_writer.hpp"
 
 namespace saccade {
@@ -31,6 +32,7 @@ class EventWriter {
 
   /// `came_ns`: for events that name no time of their own [ns, monotonic].
   absl::Status Write(const v1::Event& event, Timestamp came_ns);
+  absl::Status Write(const v1::GetSurfaceResponse& surface, Timestamp now_ns);
   McapWriter& mcap() { return *mcap_; }
 
  private:

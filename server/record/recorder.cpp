@@ -176,6 +176,7 @@ absl::Status Recorder::OpenFile() {
     if (absl::Status closed = writer_->mcap().Close(); !closed.ok()) return closed;
   }
   writer_ = *std::move(opened);
+  surface_.Restart();
   state_.file = writer_->mcap().file().string();
   opened_ = flushed_ = synced_ = looked_ = key_frame_ = Clock::now();
   return absl::OkStatus();
@@ -250,6 +251,13 @@ absl::Status Recorder::Attend(Clock::time_point now) {
   };
   if (due(flushed_, kFlushEvery)) {
     if (absl::Status flushed = writer_->mcap().Flush(); !flushed.ok()) return flushed;
+  }
+  if (const auto surface = hub_.backend()->surface()) {
+    if (const auto chunks = surface_.Due(*surface, MonotonicNow())) {
+      if (absl::Status written = writer_->Write(*chunks, MonotonicNow()); !written.ok()) {
+        return written;
+      }
+    }
   }
   if (due(synced_, kSyncEvery)) {
     if (absl::Status synced = writer_->mcap().Sync(); !synced.ok()) return synced;

@@ -13,6 +13,7 @@
 #include "server/pipeline/recording.hpp"
 #include "server/record/event_writer.hpp"
 #include "server/record/recorded_stream.hpp"
+#include "server/record/surface_rounds.hpp"
 
 namespace saccade {
 
@@ -82,6 +83,7 @@ class Recorder final : public RecordingPort {
   std::unique_ptr<EventWriter> writer_;
   std::shared_ptr<RecordedStream> flow_, state_stream_;
   Clock::time_point opened_, flushed_, synced_, looked_, key_frame_, state_begun_;
+  SurfaceRounds surface_;
   std::uint64_t bytes_before_ = 0, messages_before_ = 0;  // of finished files
   std::uint64_t lost_before_ = 0, lost_seen_ = 0;
   int files_ = 0;

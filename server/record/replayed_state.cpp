@@ -11,6 +11,7 @@
 #include "shared/wire/from_proto.hpp"
 #include "shared/wire/gaze.hpp"
 #include "shared/wire/scene.hpp"
+#include "shared/wire/surface.hpp"
 
 namespace saccade {
 namespace {
@@ -61,6 +62,7 @@ void ReplayedState::Restart() {
   features_.clear();
   by_id_.clear();
   annotations_ = std::make_shared<const AnnotationList>();
+  ForgetSurface();
   picture_.reset();
   newest_.reset();
   first_id_ = last_id_ + 1;
@@ -191,12 +193,42 @@ absl::Status ReplayedState::TakeAnnotations(const McapReader::Message& message) 
   return absl::OkStatus();
 }
 
+void ReplayedState::ForgetSurface() {
+  auto none = std::make_shared<SurfaceSnapshot>();
+  none->edition = ++surface_edition_;
+  surface_ = std::move(none);
+}
+
+absl::Status ReplayedState::TakeSurface(const McapReader::Message& message, EventSink* sink) {
+  v1::GetSurfaceResponse recorded;
+  if (absl::Status parsed = ParseInto(message, recorded); !parsed.ok()) return parsed;
+  if (recorded.edition() != recorded_edition_) ForgetSurface();
+  recorded_edition_ = recorded.edition();
+  auto surface = std::make_shared<SurfaceSnapshot>(*surface_);
+  surface->generation = generation_;
+  for (const v1::SurfaceChunk& each : recorded.chunks()) {
+    absl::StatusOr<SurfaceChunk> chunk = wire::FromProto(each);
+    if (!chunk.ok()) return Unreadable(message.topic, chunk.status().message());
+    const auto before = surface->chunks.find(chunk->index);
+    if (before != surface->chunks.end() && before->second->positions == chunk->positions &&
+        before->second->colors_rgb == chunk->colors_rgb) {
+      continue;  // told again for who begins there
+    }
+    chunk->version = ++surface->version;
+    surface->chunks[chunk->index] = std::make_shared<const SurfaceChunk>(*std::move(chunk));
+  }
+  surface_ = std::move(surface);
+  if (sink != nullptr) sink->OnSurface(surface_);
+  return absl::OkStatus();
+}
+
 absl::Status ReplayedState::Take(const McapReader::Message& message, EventSink* sink) {
   if (message.topic == "/saccade/pose") return TakePose(message, sink);
   if (message.topic == "/saccade/picture") return TakePicture(message);
   if (message.topic == "/camera/video") return TakeVideo(message, sink);
   if (message.topic == "/saccade/map") return TakeMap(message);
   if (message.topic == "/saccade/annotations") return TakeAnnotations(message);
+  if (message.topic == "/saccade/surface") return TakeSurface(message, sink);
   if (message.topic != "/saccade/gaze") return absl::OkStatus();
   v1::GazeState state;
   if (absl::Status parsed = ParseInto(message, state); !parsed.ok()) return parsed;

@@ -33,6 +33,8 @@ class ReplayedState {
   std::shared_ptr<const CameraModel> camera() const { return camera_; }
   std::shared_ptr<const AnnotationList> annotations() const { return annotations_; }
   std::shared_ptr<const GazeSnapshot> gaze() const { return gaze_; }
+  /// Never null.
+  std::shared_ptr<const SurfaceSnapshot> surface() const { return surface_; }
   std::uint64_t pictures() const { return sequence_; }
   /// Nothing before the first pose.
   const std::optional<TrackedEvent>& newest() const { return newest_; }
@@ -43,6 +45,8 @@ class ReplayedState {
   absl::Status TakeVideo(const McapReader::Message& message, EventSink* sink);
   absl::Status TakeMap(const McapReader::Message& message);
   absl::Status TakeAnnotations(const McapReader::Message& message);
+  void ForgetSurface();
+  absl::Status TakeSurface(const McapReader::Message& message, EventSink* sink);
   absl::StatusOr<TrackedEvent> EventOf(const v1::PoseEvent& pose) const;
 
   Timestamp now_ns_ = 0;
@@ -52,6 +56,8 @@ class ReplayedState {
   std::map<std::string, Annotation> by_id_;
   std::shared_ptr<const AnnotationList> annotations_ = std::make_shared<const AnnotationList>();
   std::shared_ptr<const GazeSnapshot> gaze_ = std::make_shared<const GazeSnapshot>();
+  std::shared_ptr<const SurfaceSnapshot> surface_ = std::make_shared<const SurfaceSnapshot>();
+  std::uint64_t surface_edition_ = FirstSurfaceEdition(), recorded_edition_ = 0;
   std::shared_ptr<const CameraModel> camera_;
   std::string lens_;                       // the same, as recorded
   std::optional<v1::AccessUnit> picture_;  // its bytes come with the next message

@@ -61,6 +61,11 @@ std::shared_ptr<const GazeSnapshot> Replayer::gaze() const {
   return gaze_;
 }
 
+std::shared_ptr<const SurfaceSnapshot> Replayer::surface() const {
+  const std::lock_guard lock(mutex_);
+  return surface_;
+}
+
 ReplayState Replayer::replay() const {
   const std::lock_guard lock(mutex_);
   return published_;
@@ -102,6 +107,7 @@ void Replayer::Publish() {
   published_ = std::move(state);
   annotations_ = state_.annotations();
   gaze_ = state_.gaze();
+  surface_ = state_.surface();
 }
 
 void Replayer::Anchor() {
@@ -223,11 +229,13 @@ void Replayer::Carry(const Order& order) {
     }
   }
   Publish();
+  if (order.change.position_s || from_start) sink_->OnSurface(state_.surface());
   if (!again) status.ok() ? order.done(replay()) : order.done(status);
 }
 
 void Replayer::Run(std::stop_token stop) {
   Seek(mcap_->first_ns()).IgnoreError();  // it was read by Open
+  sink_->OnSurface(state_.surface());
   while (!stop.stop_requested()) {
     std::deque<Order> orders;
     bool still = false;  // and so long that it is told again

@@ -35,6 +35,7 @@ class Replayer final : public ReplayPort {
   std::shared_ptr<const CameraModel> camera() const { return camera_; }
   std::shared_ptr<const AnnotationList> annotations() const;
   std::shared_ptr<const GazeSnapshot> gaze() const;
+  std::shared_ptr<const SurfaceSnapshot> surface() const;
 
   ReplayState replay() const override;
   void Change(const ReplayChange& change, Done<ReplayState> done) override;
@@ -75,6 +76,7 @@ class Replayer final : public ReplayPort {
   ReplayState published_;
   std::shared_ptr<const AnnotationList> annotations_;
   std::shared_ptr<const GazeSnapshot> gaze_;
+  std::shared_ptr<const SurfaceSnapshot> surface_;
   bool stopped_ = false;
 
   // The thread's.

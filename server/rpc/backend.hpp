@@ -18,6 +18,7 @@
 #include "server/pipeline/pointers.hpp"
 #include "server/pipeline/scene_commands.hpp"
 #include "shared/scene/scene_light.hpp"
+#include "shared/scene/surface_snapshot.hpp"
 
 namespace saccade {
 
@@ -78,6 +79,8 @@ class Backend : public CommandPort {
   virtual std::shared_ptr<const Scene> scene() const = 0;
   /// How light falls, as far as it is known.
   virtual SceneLight light() const { return {}; }
+  /// Null: none are made.
+  virtual std::shared_ptr<const SurfaceSnapshot> surface() const { return nullptr; }
   /// Null: none are kept.
   virtual KeptMaps* maps() { return nullptr; }
   /// To the scene's thread. On error `done` is not called: ResourceExhausted, Unavailable.

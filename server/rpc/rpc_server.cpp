@@ -20,6 +20,7 @@
 #include "server/rpc/replay_service.hpp"
 #include "server/rpc/scene_service.hpp"
 #include "server/rpc/session_service.hpp"
+#include "server/rpc/surface_service.hpp"
 #include "server/rpc/talk_service.hpp"
 #include "server/rpc/team_service.hpp"
 
@@ -106,6 +107,7 @@ class RpcServer::Impl {
         gaze_service_(backend, gate_),
         pointer_service_(backend, pointers_, gate_),
         scene_service_(backend, gate_),
+        surface_service_(backend, gate_),
         calibration_service_(options.calibration, gate_),
         talk_service_(backend, hub, gate_, options.limits.voice_packets),
         team_service_(options.team, gate_),
@@ -159,6 +161,7 @@ class RpcServer::Impl {
     builder.RegisterService(&gaze_service_);
     builder.RegisterService(&pointer_service_);
     builder.RegisterService(&scene_service_);
+    builder.RegisterService(&surface_service_);
     builder.RegisterService(&calibration_service_);
     builder.RegisterService(&talk_service_);
     builder.RegisterService(&team_service_);
@@ -211,6 +214,7 @@ class RpcServer::Impl {
   GazeService gaze_service_;
   PointerService pointer_service_;
   SceneService scene_service_;
+  SurfaceService surface_service_;
   CalibrationService calibration_service_;
   TalkService talk_service_;
   TeamService team_service_;

@@ -72,6 +72,10 @@ void StreamHub::OnScene(const std::shared_ptr<const Scene>& scene) {
   Leave([&](Pending& pending) { pending.scene = scene; });
 }
 
+void StreamHub::OnSurface(const std::shared_ptr<const SurfaceSnapshot>& surface) {
+  Leave([&](Pending& pending) { pending.surface = surface; });
+}
+
 void StreamHub::Connect(Backend* backend) {
   backend_ = backend;
   const std::lock_guard lock(mutex_);
@@ -170,6 +174,7 @@ struct StreamHub::Round {
   std::shared_ptr<const v1::PresenceEvent> presence;
   std::shared_ptr<const PointerList> pointers;
   std::shared_ptr<const Scene> scene;
+  std::shared_ptr<const SurfaceSnapshot> surface;
   std::shared_ptr<const ChatLog> chat;
   std::deque<VoiceBatch> voice;
 
@@ -188,6 +193,7 @@ struct StreamHub::Round {
     if (presence) subscription.OfferPresence(presence);
     if (pointers) subscription.OfferPointers(pointers);
     if (scene) subscription.OfferScene(scene);
+    if (surface) subscription.OfferSurface(surface);
   }
 };
 
@@ -208,6 +214,7 @@ StreamHub::Round StreamHub::Prepare() {
     round.end_frames = pending.end_frames;
     round.pointers = std::move(pending.pointers);
     round.scene = std::move(pending.scene);
+    round.surface = std::move(pending.surface);
     round.voice = std::move(pending.voice);
     if (pending.chat) round.chat = chat_;
     if (presence_changed_ && now_ns - presence_ns_ >= kPresenceInterval) {
@@ -269,6 +276,7 @@ void StreamHub::Add(const std::shared_ptr<Subscriber>& subscriber) {
       if (state) subscription.Offer(*state);
       subscription.OfferGaze(backend_->gaze());
       subscription.OfferScene(backend_->scene());
+      if (const auto surface = backend_->surface()) subscription.OfferSurface(surface);
       if (end) subscription.OfferEnd(*end);
       subscription.OfferPresence(present);
       if (pointing) subscription.OfferPointers(pointing);

@@ -102,6 +102,7 @@ class StreamHub : public EventSink {
   void OnPointers(std::shared_ptr<const PointerList> pointers);
   void OnPicturePause(const std::shared_ptr<const PicturePause>& state) override;
   void OnScene(const std::shared_ptr<const Scene>& scene) override;
+  void OnSurface(const std::shared_ptr<const SurfaceSnapshot>& surface) override;
 
   /// To everybody who listens but the speaker.
   void OnVoice(VoiceBatch batch);
@@ -140,6 +141,7 @@ class StreamHub : public EventSink {
     std::optional<std::uint64_t> end_frames;
     std::shared_ptr<const PointerList> pointers;
     std::shared_ptr<const Scene> scene;
+    std::shared_ptr<const SurfaceSnapshot> surface;
     std::deque<VoiceBatch> voice;
     bool chat = false;
   };

@@ -162,6 +162,8 @@ std::optional<Subscription::Payload> Subscription::Fill(Kind kind, Timestamp now
       return FillPointers();
     case kScene:
       return FillScene();
+    case kSurface:
+      return FillSurface();
     case kEnd: {
       if (!end_frames_) return std::nullopt;
       v1::EndOfSource end;
@@ -221,6 +223,14 @@ std::optional<Subscription::Payload> Subscription::FillScene() {
 }
 
 // Who is behind gets it in parts; what is no longer kept is left out.
+std::optional<Subscription::Payload> Subscription::FillSurface() {
+  if (!Has(v1::TOPIC_SURFACE) || !std::exchange(surface_due_, false)) return std::nullopt;
+  v1::SurfaceEvent event;
+  event.set_edition(surface_.first);
+  event.set_version(surface_.second);
+  return Payload{v1::Event::kSurfaceFieldNumber, Serialized(event)};
+}
+
 std::optional<Subscription::Payload> Subscription::FillChat() {
   if (!Has(v1::TOPIC_CHAT) || chat_ == nullptr) return std::nullopt;
   const auto first = After(*chat_, chat_sent_);

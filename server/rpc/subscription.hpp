@@ -64,6 +64,13 @@ class Subscription {
     scene_ = std::move(scene);
     scene_due_ = true;
   }
+  /// Only how new it is goes out; chunks are asked for.
+  void OfferSurface(const std::shared_ptr<const SurfaceSnapshot>& surface) {
+    const std::pair now(surface->edition, surface->version);
+    if (surface_ == now) return;
+    surface_ = now;
+    surface_due_ = true;
+  }
   void OfferEnd(std::uint64_t frames) {
     if (!std::exchange(end_seen_, true)) end_frames_ = frames;
   }
@@ -105,6 +112,7 @@ class Subscription {
     kStatistics,
     kPointers,
     kScene,
+    kSurface,
     kEnd,
     kKinds
   };
@@ -126,6 +134,7 @@ class Subscription {
   std::optional<Payload> FillVideo(Timestamp now_ns);
   std::optional<Payload> FillPointers();
   std::optional<Payload> FillScene();
+  std::optional<Payload> FillSurface();
   std::optional<Payload> FillChat();
   std::optional<Payload> FillVoice();
 
@@ -152,6 +161,8 @@ class Subscription {
   std::shared_ptr<const Scene> scene_;  // null: none so far
   bool scene_due_ = false;
   SceneReader scene_reader_;
+  std::pair<std::uint64_t, std::uint64_t> surface_{};  // edition, version; 0, 0: none so far
+  bool surface_due_ = false;
   std::optional<EngineStatistics> statistics_;
   std::optional<std::uint64_t> end_frames_;
   bool end_seen_ = false;

@@ -6,6 +6,7 @@
 
 #include "server/surface/surface_nets.hpp"
 #include "server/surface/voxel_map.hpp"
+#include "shared/scene/surface_snapshot.hpp"
 
 namespace saccade {
 
@@ -16,7 +17,7 @@ namespace saccade {
 /// others. Work is done in small steps. Not for several threads.
 class SurfaceFusion {
  public:
-  using Chunks = std::map<SurfaceChunk::Index, std::shared_ptr<const SurfaceChunk>>;
+  using Chunks = SurfaceSnapshot::Chunks;
 
   /// `voxel`: side of one, in the map's unit.
   SurfaceFusion(float voxel, const SurfaceOptions& options)

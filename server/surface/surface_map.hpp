@@ -48,6 +48,8 @@ class SurfaceMap {
   /// Rises when all chunks before mean nothing any more: another map, another unit.
   std::uint64_t edition() const { return edition_; }
   std::uint64_t version() const { return fusion_ ? fusion_->version() : version_; }
+  /// All of it as it is now, to be handed to other threads.
+  SurfaceSnapshot Snapshot() const { return {generation_, edition_, version(), voxel(), chunks()}; }
   const SurfaceCost& cost() const { return cost_; }
   /// Of pictures, depths, voxels and chunks.
   std::size_t bytes() const;

@@ -69,6 +69,9 @@ class WearerTee final : public EventSink {
     next_.OnPicturePause(state);
   }
   void OnScene(const std::shared_ptr<const Scene>& scene) override { next_.OnScene(scene); }
+  void OnSurface(const std::shared_ptr<const SurfaceSnapshot>& surface) override {
+    next_.OnSurface(surface);
+  }
 
  private:
   EventSink& next_;

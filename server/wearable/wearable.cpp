@@ -46,7 +46,8 @@ const WearableStep& Wearable::Step(Frame frame) {
     step.frame = std::make_shared<const Frame>(std::move(seen));
   }
   ring_.Push({step.frame, step.snapshot});
-  pointers_->OnSnapshot(step.snapshot);
+  pointers_->OnSnapshot(step.snapshot, surface_);
+  book_->SetSurface(surface_);
   if (generation_ != step.snapshot->map_generation) {
     generation_ = step.snapshot->map_generation;
     world_ = resuming_.empty() ? MakeUuid() : std::exchange(resuming_, "");

@@ -44,6 +44,9 @@ class Wearable {
       const SourceInfo& source, std::unique_ptr<FrameTracker> tracker, AnchorOptions anchors,
       std::unique_ptr<AnnotationJournal> journal = nullptr, std::function<void()> wake = nullptr);
 
+  /// What the place looks like, from the next frame on: clicks land on it.
+  void SetSurface(std::shared_ptr<const SurfaceSnapshot> surface) { surface_ = std::move(surface); }
+
   /// Frames by rising capture time (see Tracker::Track). The result stays until the next Step.
   const WearableStep& Step(Frame frame);
   /// Carries a command out; it is answered once, when what it changed is kept.
@@ -85,7 +88,8 @@ class Wearable {
   std::unique_ptr<AnnotationBook> book_;      // the caller's thread, but for Latest()
   mutable std::timed_mutex book_gone_mutex_;  // held to throw book_ away, and to read it elsewhere
   std::optional<WearableStep> newest_;
-  std::string world_;     // UUID of the map's coordinates
+  std::shared_ptr<const SurfaceSnapshot> surface_;  // null: none is known
+  std::string world_;                               // UUID of the map's coordinates
   std::string resuming_;  // of the map that the tracker looks for, until the next frame
   std::optional<std::uint64_t> generation_;  // that world_ is of
 };

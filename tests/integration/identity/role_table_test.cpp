@@ -83,6 +83,7 @@ const std::map<std::string, Least>& Promised() {
       {"CalibrationService/FinishCalibration", kPilot},
       {"CalibrationService/StopCalibration", kPilot},
       {"CalibrationService/SaveCalibration", kWearer},
+      {"SurfaceService/Get", kViewer},
       {"RecordingService/GetRecording", kViewer},
       {"RecordingService/StartRecording", kWearer},
       {"RecordingService/StopRecording", kWearer},

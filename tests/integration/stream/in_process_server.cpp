@@ -10,6 +10,13 @@
 namespace saccade::testing {
 namespace {
 
+constexpr int kTextureRange_px = 300, kTextureStep_px = 2;
+constexpr FrameId kKeyframeEvery = 8;
+
+int TextureShift(FrameId frame) {
+  return static_cast<int>(kTextureStep_px * frame % kTextureRange_px);
+}
+
 class MovingTexture final : public FrameSource {
  public:
   explicit MovingTexture(const InProcessOptions& options) : options_(options) {
@@ -21,7 +28,7 @@ class MovingTexture final : public FrameSource {
     intrinsics.cy = 0.5 * (options.height - 1);
     info_.uri = "test:texture";
     info_.camera = std::make_shared<CameraModel>(intrinsics);
-    texture_.create(options.height, options.width + 300, CV_8UC1);
+    texture_.create(options.height, options.width + kTextureRange_px, CV_8UC1);
     cv::randu(texture_, 0, 255);
     cv::GaussianBlur(texture_, texture_, cv::Size(0, 0), 4.0);
   }
@@ -35,8 +42,8 @@ class MovingTexture final : public FrameSource {
     Frame frame;
     frame.id = next_++;
     frame.capture_time_ns = frame.received_time_ns = MonotonicNow();
-    const int shift = static_cast<int>(2 * frame.id % 300);
-    frame.grey = texture_(cv::Rect(shift, 0, options_.width, options_.height)).clone();
+    frame.grey =
+        texture_(cv::Rect(TextureShift(frame.id), 0, options_.width, options_.height)).clone();
     frame.camera = info_.camera;
     return frame;
   }
@@ -52,7 +59,9 @@ class MovingTexture final : public FrameSource {
 class ScriptedTracker final : public FrameTracker {
  public:
   explicit ScriptedTracker(const InProcessOptions& options)
-      : before_frame_(options.before_frame), lively_(options.lively_features) {}
+      : before_frame_(options.before_frame),
+        lively_(options.lively_features),
+        moves_aside_(options.moves_aside) {}
 
   std::shared_ptr<const MapSnapshot> Track(const Frame& frame) override {
     before_frame_();
@@ -63,6 +72,7 @@ class ScriptedTracker final : public FrameTracker {
     snapshot->quality = TrackingQuality::kGood;
     snapshot->metric = true;
     if (frame.mount) snapshot->world_from_camera = MountModel().MountFromCamera(*frame.mount);
+    if (moves_aside_) MoveAside(frame, *snapshot);
     snapshot->map_generation = generation_;
     snapshot->attempted = snapshot->matched = 20;
     const Rigid3 camera_from_world = snapshot->world_from_camera.Inverse();
@@ -86,6 +96,7 @@ class ScriptedTracker final : public FrameTracker {
     }
     return snapshot;
   }
+  std::shared_ptr<const KeyframePlaces> keyframes() const override { return keyframes_; }
   void Reset() override { ++generation_; }
   absl::StatusOr<FeatureId> SeedFeature(const Frame&, const Rigid3&, const Eigen::Vector2d&, double,
                                         double) override {
@@ -93,8 +104,23 @@ class ScriptedTracker final : public FrameTracker {
   }
 
  private:
+  void MoveAside(const Frame& frame, MapSnapshot& snapshot) {
+    constexpr double kTexture_m = 2.0;
+    Rigid3& pose = snapshot.world_from_camera;
+    pose.translation.x() = TextureShift(frame.id) * kTexture_m / frame.camera->intrinsics().fx;
+    if (frame.id % kKeyframeEvery != 0 || kTextureStep_px * frame.id >= kTextureRange_px) return;
+    KeyframePlaces places;
+    if (keyframes_) places = *keyframes_;
+    places.generation = generation_;
+    places.metric = true;
+    places.keyframes.push_back({static_cast<std::int64_t>(frame.id), frame.id, pose, kTexture_m});
+    keyframes_ = std::make_shared<const KeyframePlaces>(std::move(places));
+  }
+
   const std::function<void()> before_frame_;
   const int lively_;
+  const bool moves_aside_;
+  std::shared_ptr<const KeyframePlaces> keyframes_;
   std::uint64_t generation_ = 0;
 };
 
@@ -115,6 +141,7 @@ InProcessServer::InProcessServer(const InProcessOptions& options) {
   engine_options.version = "test";
   engine_options.mailbox = options.mailbox;
   engine_options.mount = options.mount;
+  engine_options.surfaces = options.surfaces;
   engine_ =
       Must(Engine::Create(engine_options, std::make_unique<MovingTexture>(options),
                           std::make_unique<ScriptedTracker>(options), std::move(store), hub_));

@@ -23,6 +23,10 @@ struct InProcessOptions {
   /// Features that change in every frame, beside the 20 that stand still: so many a map of a desk
   /// sends anew.
   int lively_features = 0;
+  /// The camera moves aside as the texture does, which then hangs at z = 2 m, and keyframes are
+  /// told of.
+  bool moves_aside = false;
+  std::shared_ptr<SurfaceRunner> surfaces;  // null: none
   /// Runs on the tracker thread before each frame.
   std::function<void()> before_frame = [] {};
 };
