@@ -165,6 +165,7 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
                                    newest.trail(), *depth);
   }
   if (look) TakeSurface(*look, *depth, resolved.doubt);
+  if (!look && samples.size() > ids.size()) DoubtHole(*depth, resolved.doubt);
   resolved.method = depth->method;
   resolved.distance_m = depth->depth_m;
   resolved.point_in_world = world_from_camera.translation + depth->depth_m * ray;
@@ -245,6 +246,7 @@ absl::StatusOr<ResolvedTarget> ResolveRay(const RayTarget& target, const MapView
   if (!depth) return NoDepth();
   ResolvedTarget resolved;
   if (look) TakeSurface(*look, *depth, resolved.doubt);
+  if (!look && samples.size() > ids.size()) DoubtHole(*depth, resolved.doubt);
   resolved.method = depth->method;
   resolved.point_in_world = target.origin_in_world + depth->depth_m * ray;
   resolved.covariance_in_world = AlongAndAcross(

@@ -15,7 +15,8 @@ constexpr double kSurfaceShare = 0.010;  // sigma, of the range
 constexpr double kSurfaceVoxels = 0.5;
 constexpr double kShallow = 0.15;  // cosine: a plane seen so flat says nothing of its neighbours
 constexpr double kAgree_sigma = 3.0;
-constexpr double kMeant = 0.3;  // that the other of two surfaces was meant
+constexpr double kMeant = 0.3;       // that the other of two surfaces was meant
+constexpr double kHoleShare = 0.08;  // sigma, of the range: measured, 2026-12-01-clicks.md
 
 }  // namespace
 
@@ -60,7 +61,8 @@ std::vector<SurfaceSample> SurfaceAround(const SurfaceSnapshot& surface,
   std::vector<SurfaceSample> samples;
   for (int k = 0; k < kLooks; ++k) {
     const double far = static_cast<double>(k) / (kLooks - 1);
-    const double turn = radians_per_px * kNearest_px * std::pow(kFarthest_px / kNearest_px, far);
+    const double turn =
+        radians_per_px * (kNearest_px + (kFarthest_px - kNearest_px) * std::pow(far, 1.5));
     const Eigen::Vector3d beside(turn * std::cos(k * kGolden_rad), turn * std::sin(k * kGolden_rad),
                                  1.0);
     const Eigen::Vector3d ray = (world_from_ray.rotation * beside).normalized();
@@ -75,6 +77,12 @@ std::vector<SurfaceSample> SurfaceAround(const SurfaceSnapshot& surface,
   return samples;
 }
 
+void DoubtHole(const SurfaceDepth& depth, DepthDoubt& doubt) {
+  if (depth.at_feature) return;
+  doubt.relief_sigma_m = std::max(doubt.relief_sigma_m, kHoleShare * depth.depth_m);
+  doubt.clutter_sigma_m = std::max(doubt.clutter_sigma_m, doubt.relief_sigma_m);
+}
+
 void TakeSurface(const SurfaceLook& look, SurfaceDepth& depth, DepthDoubt& doubt) {
   const double apart_m = std::abs(look.range_m - depth.depth_m);
   const bool agrees = apart_m < kAgree_sigma * std::hypot(look.sigma_m, depth.sigma_m);
@@ -83,6 +91,7 @@ void TakeSurface(const SurfaceLook& look, SurfaceDepth& depth, DepthDoubt& doubt
         look.other_range_m > 0.0 ? std::abs(look.other_range_m - look.range_m) : 0.0;
     doubt.relief_sigma_m = std::max(doubt.relief_sigma_m, kMeant * std::max(other_m, apart_m));
     doubt.clutter_sigma_m = std::max(doubt.clutter_sigma_m, doubt.relief_sigma_m);
+    if (look.other_range_m == 0.0) DoubtHole(depth, doubt);
     return;
   }
   const bool finer = depth.at_feature && agrees && depth.sigma_m < look.sigma_m;

@@ -31,6 +31,10 @@ std::optional<SurfaceLook> LookAtSurface(const SurfaceSnapshot& surface,
 std::vector<SurfaceSample> SurfaceAround(const SurfaceSnapshot& surface,
                                          const Rigid3& ray_from_world, double radians_per_px);
 
+/// Through a hole between surfaces something else may be seen than what goes on around it: nobody
+/// has seen that it does. A feature at the very pixel knows better.
+void DoubtHole(const SurfaceDepth& depth, DepthDoubt& doubt);
+
 /// Takes the surface's word on a depth (slam-spec section 9: it comes first), but for a feature at
 /// the very pixel that agrees: that is finer. Where an outline is near, what was found otherwise
 /// stands, and the other surface is in doubt.
