@@ -14,7 +14,7 @@ constexpr double kSweptAgain_px = 0.7;  // of a small picture, that a view has m
 constexpr double kFarFromAsked = 0.6;   // of the distance
 constexpr int kFollowEvery = 8;         // keyframes
 constexpr double kFarMoved = 3.0;       // times what is worth following: at once
-constexpr int kConfirmedAt[] = {3, 8};  // keyframes asked: then it is done again
+constexpr int kConfirmedAt[] = {2, 4, 8};  // keyframes asked: then it is done again
 
 }  // namespace
 
@@ -156,7 +156,7 @@ bool SurfaceMap::Sweep(std::int64_t id, Kept& kept) {
   kept.confirm_due = true;
   for (auto& [other, each] : kept_) {
     if (other == id || !each.depth || each.confirm_due) continue;
-    if (each.confirmed_by >= kConfirmedAt[1]) continue;
+    if (each.confirmed_by >= kConfirmedAt[2]) continue;
     each.confirm_due = Overlap(kept.place.world_from_camera, each.place.world_from_camera,
                                each.picture.camera, kept.place.distance_m);
   }

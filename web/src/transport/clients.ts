@@ -6,6 +6,7 @@ import { CalibrationService } from '../gen/saccade/v1/calibration_pb';
 import { GazeService } from '../gen/saccade/v1/gaze_pb';
 import { MapService } from '../gen/saccade/v1/map_pb';
 import { PointerService } from '../gen/saccade/v1/pointer_pb';
+import { RecordingService } from '../gen/saccade/v1/recording_pb';
 import { SceneService } from '../gen/saccade/v1/scene_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
 import { TalkService } from '../gen/saccade/v1/talk_pb';
@@ -17,6 +18,7 @@ export interface Clients {
   readonly map: Client<typeof MapService>;
   readonly gaze: Client<typeof GazeService>;
   readonly pointers: Client<typeof PointerService>;
+  readonly recording: Client<typeof RecordingService>;
   readonly scene: Client<typeof SceneService>;
   readonly talk: Client<typeof TalkService>;
 }
@@ -32,6 +34,7 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
     map: createClient(MapService, transport),
     gaze: createClient(GazeService, transport),
     pointers: createClient(PointerService, transport),
+    recording: createClient(RecordingService, transport),
     scene: createClient(SceneService, transport),
     talk: createClient(TalkService, transport),
   };

@@ -34,6 +34,7 @@ import { PictureDialog } from './picture_dialog';
 import type { Player } from './player';
 import { Placer } from './placer';
 import { handleDrop, handleMapPointer, handleVideoPointer } from './pointer';
+import { RecordControl } from './record_control';
 import { whyNotEdit } from './rights';
 import { SelectedMarks } from './selected_marks';
 import { Sheets } from './sheets';
@@ -80,6 +81,7 @@ export class App {
   private readonly talk: TalkPanel;
   private readonly thingsPanel: ThingsPanel;
   private readonly firstTask: FirstTask;
+  private readonly record: RecordControl;
   private readonly stage = h('main', {});
   private nameless = isNameless(location.search, storage());
   private mapLoading = false;
@@ -129,7 +131,8 @@ export class App {
     this.help.onFirstTask = () => this.firstTask.begin();
     const maps = new MapsSheet(session);
     this.help.onMaps = () => maps.open();
-    this.strip.element.append(maps.button);
+    this.record = new RecordControl(session);
+    this.strip.element.append(maps.button, this.record.button);
     new ToolNames(this.tools.element);
     this.stage.append(this.map.element, this.video.element, this.notice.element);
     this.stage.append(this.firstTask.element, this.thingsPanel.element);
@@ -228,7 +231,8 @@ export class App {
     this.panelsMs = nowMs;
     this.element.dataset['link'] = session.link.kind;
     this.header.update(session, player, this.meter);
-    this.strip.update(session, this.meter, this.screen.rate(nowMs));
+    this.strip.update(session, this.meter, this.screen.rate(nowMs), this.record.problem);
+    this.record.update(nowMs);
     const on = { follow: this.map.map?.following ?? false, freeze: this.video.frozen };
     this.tools.update(state, on, (name) => (CHANGES.has(name) ? whyNotEdit(session) : undefined));
     this.element.dataset['overlayMs'] =

@@ -1,6 +1,7 @@
 import { pageNowMs } from '../session/clock';
 import type { LatencyMeter } from '../session/latency';
 import { cleanName, keepName, MAX_NAME_BYTES, recallName } from '../session/name';
+import { isRecorder } from '../session/recording';
 import type { Session } from '../session/session';
 import type { Participant } from '../session/types';
 import { colourOf } from '../scene/strokes';
@@ -79,10 +80,12 @@ export class Header {
     setText(this.count, presenceWords(participants));
     this.presence.title = participants.map(({ name, role }) => `${name}, ${role}`).join('\n');
     this.people.replaceChildren(
-      ...participants.slice(0, MOST_PEOPLE).map(({ name, role, colorRgba }) => {
+      ...participants.slice(0, MOST_PEOPLE).map((each) => {
+        const { name, role, colorRgba } = each;
         const dot = h('span', { class: 'person', 'aria-hidden': 'true' });
         dot.style.setProperty('--person', colourOf({ colorRgba: colorRgba || 0xa9aeb4ff }));
-        const words = role === 'expert' ? name : `${name} (${role})`;
+        const titled = role === 'expert' ? name : `${name} (${role})`;
+        const words = isRecorder(each) ? 'recorded' : titled;
         return h('span', { class: 'participant' }, dot, h('span', { class: 'who' }, words));
       }),
     );

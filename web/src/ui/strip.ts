@@ -1,6 +1,6 @@
 import { type LatencyMeter, STAGES } from '../session/latency';
 import type { Session } from '../session/session';
-import { h, setText } from './dom';
+import { h, setClass, setText } from './dom';
 import { counted } from './words';
 
 /** The bottom line: where the time goes, and what was lost. */
@@ -23,8 +23,8 @@ export class Strip {
     );
   }
 
-  /** `pageFps`: screen frames a second of this page. */
-  update(session: Session, meter: LatencyMeter, pageFps: number): void {
+  /** `pageFps`: screen frames a second of this page. `problem`: goes before what was lost. */
+  update(session: Session, meter: LatencyMeter, pageFps: number, problem: string): void {
     for (const stage of STAGES) {
       const times = session.live ? meter.get(stage) : undefined;
       const element = this.values.get(stage);
@@ -36,7 +36,8 @@ export class Strip {
           : `${stage}: not measured yet`;
       }
     }
-    setText(this.losses, session.live ? lossWords(session, pageFps) : '');
+    setText(this.losses, problem || (session.live ? lossWords(session, pageFps) : ''));
+    setClass(this.losses, 'problem', problem !== '');
   }
 }
 

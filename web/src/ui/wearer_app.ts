@@ -1,5 +1,6 @@
 import { pageNowMs } from '../session/clock';
 import { hasHead } from '../session/gaze';
+import { isRecorder } from '../session/recording';
 import type { Session } from '../session/session';
 import { VoiceRoom } from '../talk/voice_room';
 import { Chime } from './chime';
@@ -7,6 +8,7 @@ import { h, isComposing, setClass, setText } from './dom';
 import { NewsWatch } from './news';
 import { PauseControl } from './pause_control';
 import type { Player } from './player';
+import { RecordControl } from './record_control';
 import { SpokenPause } from './spoken_pause';
 import { WearerHead } from './wearer_head';
 import { clockWords, statusWords } from './words';
@@ -37,6 +39,7 @@ export class WearerApp {
   private readonly voiceButton = button('small voice', 'V');
   private readonly muteButton = button('small mute', 'M');
   private readonly head: WearerHead;
+  private readonly record: RecordControl;
   private readonly pause: PauseControl;
   private readonly chime = new Chime();
   private readonly watch: NewsWatch;
@@ -48,6 +51,8 @@ export class WearerApp {
     private readonly player: Player,
   ) {
     this.head = new WearerHead(session);
+    this.record = new RecordControl(session);
+    this.record.button.classList.add('small');
     this.pause = new PauseControl(session);
     this.spoken = new SpokenPause((paused) => this.pause.set(paused));
     this.watch = new NewsWatch(session, () => this.chime.play());
@@ -55,7 +60,7 @@ export class WearerApp {
     const small = h('div', { class: 'small-row' });
     small.append(this.voiceButton, this.muteButton, this.soundButton);
     if (SpokenPause.supported) small.append(this.spokenButton);
-    small.append(this.fullButton);
+    small.append(this.record.button, this.fullButton);
     const head = h('div', { class: 'head-row' }, this.head.stop, this.head.take);
     this.element = h(
       'main',
@@ -145,7 +150,10 @@ export class WearerApp {
     setClass(this.news, 'lit', newest !== undefined && performance.now() - newest.atMs < NEWS_MS);
     this.updateSmall();
     this.head.update();
-    const problems = [pause.problem, this.head.problem, this.room.problem, this.spoken.problem];
+    this.record.update(performance.now());
+    const problems = [pause, this.head, this.record, this.room, this.spoken].map(
+      ({ problem: text }) => text,
+    );
     const problem = problems.find((text) => text !== '');
     setText(this.notice, problem ?? noticeWords(player, stale ? age : 0));
     setClass(this.element, 'stale', stale);
@@ -175,8 +183,9 @@ function pausedText({ talk }: Session): string {
 }
 
 /** "Ann, Bea watch · Ann steers"; a name that is lit speaks. */
-function watcherWords({ participants, gaze, participantId }: Session, room: VoiceRoom): string {
-  const others = participants.filter((each) => each.role !== 'wearer');
+function watcherWords(session: Session, room: VoiceRoom): string {
+  const { participants, gaze, participantId } = session;
+  const others = participants.filter((each) => each.role !== 'wearer' && !isRecorder(each));
   const names = others.map((each) =>
     room.speaks(each.participantId) ? `🔊 ${each.name}` : each.name,
   );

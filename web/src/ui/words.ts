@@ -1,3 +1,4 @@
+import { isRecorder } from '../session/recording';
 import { spanWords } from '../session/silence';
 import { MAX_STREAMS } from '../session/tabs';
 import type { PicturePause } from '../session/talk_state';
@@ -9,6 +10,7 @@ import {
   type Pose,
   type Scale,
   type Shape,
+  type Participant,
 } from '../session/types';
 
 /** The state of things in words, with what to do about it. Never colour alone: a shape as well. */
@@ -145,13 +147,17 @@ export const counted = (count: number, thing: string): string =>
 export const shapeWord = (shape: Shape): string =>
   shape === 'ink' ? 'stroke' : shape.replace('_', ' ');
 
-/** "2 experts, 1 wearer". */
-export function presenceWords(participants: readonly { readonly role: string }[]): string {
+/** "2 experts, 1 wearer, recorded". */
+export function presenceWords(
+  present: readonly Pick<Participant, 'role' | 'participantId'>[],
+): string {
+  const participants = present.filter((each) => !isRecorder(each));
+  const recorded = participants.length < present.length ? 'recorded' : '';
   const counts = ['expert', 'wearer', 'viewer'].map((role) => {
     const count = participants.filter((participant) => participant.role === role).length;
     return count === 0 ? '' : counted(count, role);
   });
-  return counts.filter(Boolean).join(', ');
+  return [...counts, recorded].filter(Boolean).join(', ');
 }
 
 /** With its age, if it is old. */

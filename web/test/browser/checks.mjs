@@ -9,6 +9,7 @@ import { clickedPoint } from './clicked.mjs';
 import { Expert } from './expert.mjs';
 import { frozenPicture } from './freeze.mjs';
 import { checkMaps } from './maps.mjs';
+import { checkRecorded } from './recorded.mjs';
 import { AT_OUTLINES } from './outlines.mjs';
 import { CLEAR, displacement, REACH_PX } from './outline.mjs';
 import { cubePixels, inCamera, length, minus, project } from './optics.mjs';
@@ -74,6 +75,7 @@ export async function runChecks({
     await drawnCubes(context);
     await frozenPicture(context);
     if (!process.env['SACCADE_VERBOSE']) await restart(context, start);
+    await checkRecorded({ ...context, sleep, shot: (name) => shot(context, name) });
     await checkMaps({ ...context, sleep, shot: (name) => shot(context, name) });
     context.check(
       'page errors',

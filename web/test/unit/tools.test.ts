@@ -246,9 +246,13 @@ describe('words', () => {
   });
 
   it('counts who is here', () => {
-    expect(presenceWords([{ role: 'expert' }, { role: 'wearer' }, { role: 'expert' }])).toBe(
-      '2 experts, 1 wearer',
-    );
+    expect(
+      presenceWords([
+        { role: 'expert', participantId: '1' },
+        { role: 'wearer', participantId: '2' },
+        { role: 'expert', participantId: '1' },
+      ]),
+    ).toBe('2 experts, 1 wearer');
     expect(presenceWords([])).toBe('');
   });
 

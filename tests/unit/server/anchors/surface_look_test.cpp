@@ -74,8 +74,8 @@ TEST(SurfaceLook, ASlantIsNoOutline) {
 TEST(SurfaceLook, AroundAHoleThePlaneGoesOn) {
   // A wall with a bare middle.
   std::vector<Piece> frame;
-  for (const double x : {-0.5, 0.0, 0.5}) {
-    for (const double y : {-0.5, 0.0, 0.5}) {
+  for (const double x : {-0.45, 0.0, 0.45}) {
+    for (const double y : {-0.45, 0.0, 0.45}) {
       if (x != 0 || y != 0) frame.push_back({x, y, 2.0, 0.4});
     }
   }
