@@ -8,6 +8,7 @@ import { MapService } from '../gen/saccade/v1/map_pb';
 import { PointerService } from '../gen/saccade/v1/pointer_pb';
 import { SceneService } from '../gen/saccade/v1/scene_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
+import { SurfaceService } from '../gen/saccade/v1/surface_pb';
 import { TalkService } from '../gen/saccade/v1/talk_pb';
 
 export interface Clients {
@@ -18,6 +19,7 @@ export interface Clients {
   readonly gaze: Client<typeof GazeService>;
   readonly pointers: Client<typeof PointerService>;
   readonly scene: Client<typeof SceneService>;
+  readonly surface: Client<typeof SurfaceService>;
   readonly talk: Client<typeof TalkService>;
 }
 
@@ -33,6 +35,7 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
     gaze: createClient(GazeService, transport),
     pointers: createClient(PointerService, transport),
     scene: createClient(SceneService, transport),
+    surface: createClient(SurfaceService, transport),
     talk: createClient(TalkService, transport),
   };
 }
