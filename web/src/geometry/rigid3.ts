@@ -1,4 +1,4 @@
-import { add, cross, scale, type Vec3 } from './vec3';
+import { add, cross, mix, scale, type Vec3 } from './vec3';
 
 /** Hamilton, x y z w, unit length. */
 export interface Quaternion {
@@ -47,4 +47,15 @@ export function inverse(a: Rigid3): Rigid3 {
 /** aFromB, bFromC -> aFromC. */
 export function compose(a: Rigid3, b: Rigid3): Rigid3 {
   return { rotation: multiply(a.rotation, b.rotation), translation: transform(a, b.translation) };
+}
+
+/** A fraction `t` of the way from `a` to `b`, the short way round. */
+export function between(a: Rigid3, b: Rigid3, t: number): Rigid3 {
+  const [p, q] = [a.rotation, b.rotation];
+  const near = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w < 0 ? -1 : 1;
+  const of = (axis: keyof Quaternion): number => (1 - t) * p[axis] + near * t * q[axis];
+  const [x, y, z, w] = [of('x'), of('y'), of('z'), of('w')];
+  const length = Math.hypot(x, y, z, w) || 1;
+  const rotation = { x: x / length, y: y / length, z: z / length, w: w / length };
+  return { rotation, translation: mix(a.translation, b.translation, t) };
 }

@@ -9,11 +9,11 @@ import type { Annotation } from '../session/types';
 import { FeatureCloud } from './feature_cloud';
 import { Frustum } from './frustum';
 import { groundGrid } from './ground_grid';
-import { OrbitCamera } from './orbit';
 import { PathLine } from './path_line';
+import { SurfaceMeshes } from './surface_meshes';
 import { ThingMeshes } from './thing_meshes';
+import { type ViewName, Viewpoint } from './viewpoint';
 
-const FIELD_OF_VIEW_DEG = 45;
 const FRUSTUM_SHARE = 0.14; // of the distance looked from: the live picture keeps its size
 
 const REVEAL_PX = 40; // nearer to the edge than that is not in view
@@ -35,17 +35,24 @@ export interface ShownFrame {
   readonly picture: boolean; // false: where it is, without what it sees
 }
 
-/** The 3D map: features, the wearer's camera with its picture, its path. Marks go on top, in 2D. */
+/** What of the place is drawn. */
+export type Look = 'surfaces' | 'both' | 'dots';
+
+/** The 3D map: surfaces, features, the wearer's camera with its picture, its path. Marks go on top, in 2D. */
 export class MapView {
-  readonly orbit = new OrbitCamera();
+  readonly eye = new Viewpoint();
+  readonly surfaces: SurfaceMeshes;
   following = false;
+  private looks: Look = 'both';
   /** Least time between two live pictures in the map: on slow computers the video goes first. */
   pictureIntervalMs = 0;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
-  private readonly eye = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 1000);
+  private readonly surfaceScene = new THREE.Scene();
+  private readonly lens = new THREE.PerspectiveCamera(45, 1, 0.01, 1000);
   private readonly cloud = new FeatureCloud();
   private readonly path = new PathLine();
+  private readonly grid = groundGrid();
   private readonly frustum: Frustum;
   private readonly things: ThingMeshes;
   private readonly thingScene = new THREE.Scene();
@@ -73,8 +80,10 @@ export class MapView {
     const placeOf = (id: string): Vec3 | undefined =>
       session.annotations.get(id)?.anchor.pointInWorld;
     this.things = new ThingMeshes(session.scene, placeOf, true);
-    this.thingScene.add(this.things.object, this.eye);
-    this.scene.add(groundGrid(), this.cloud.object, this.path.object, this.frustum.object);
+    this.thingScene.add(this.things.object, this.lens);
+    this.surfaces = new SurfaceMeshes(session.surface);
+    this.surfaceScene.add(this.surfaces.object);
+    this.scene.add(this.grid, this.cloud.object, this.path.object, this.frustum.object);
   }
 
   resize(width: number, height: number): void {
@@ -83,8 +92,6 @@ export class MapView {
     this.height = height;
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
-    this.eye.aspect = width / Math.max(height, 1);
-    this.eye.updateProjectionMatrix();
     this.dirty = true;
   }
 
@@ -97,9 +104,43 @@ export class MapView {
   /** Brings the whole map into view. */
   frameAll(): void {
     this.following = false;
+    this.eye.backToOrbit();
     const bounds = this.bounds();
-    if (bounds) this.orbit.lookAt(bounds.centre, bounds.radius);
+    if (bounds) this.eye.orbit.lookAt(bounds.centre, bounds.radius);
     this.dirty = true;
+  }
+
+  /** Looks from there; says why not, where that cannot be. */
+  look(view: ViewName, shown: ShownFrame | undefined): string | undefined {
+    this.following = false;
+    this.held = true;
+    this.dirty = true;
+    return this.eye.choose(view, shown, this.bounds());
+  }
+
+  /** Keeps the wearer in view, or no more. */
+  follow(following: boolean): void {
+    this.following = following;
+    if (following) this.eye.backToOrbit();
+  }
+
+  get drawn(): Look {
+    return this.looks;
+  }
+
+  /** What of the place is drawn, and fetched: dots until there are surfaces. */
+  set drawn(look: Look) {
+    this.looks = look;
+    this.session.surface.want(look !== 'dots');
+    this.dirty = true;
+  }
+
+  get showsSurfaces(): boolean {
+    return this.looks !== 'dots' && !this.surfaces.empty;
+  }
+
+  get showsDots(): boolean {
+    return this.looks !== 'surfaces' || this.surfaces.empty;
   }
 
   /** Turns to a mark that is not in view, as far off as the eye is now. */
@@ -109,14 +150,20 @@ export class MapView {
     const view = this.view();
     const at = projectPoint(view, point);
     if (at && view.camera.inImage(at, REVEAL_PX)) return;
+    this.turnTo(point);
+  }
+
+  /** Turns to a place, as far off as the eye is now. */
+  turnTo(point: Vec3): void {
     this.held = true;
     this.following = false;
-    this.orbit.follow(point);
+    this.eye.backToOrbit();
+    this.eye.orbit.follow(point);
   }
 
   /** The eye, in CSS pixels of this view. */
   view(): View {
-    const f = this.height / 2 / Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    const f = this.height / 2 / Math.tan((this.eye.upright(this.aspect) * Math.PI) / 360);
     const camera = new Camera({
       model: 'pinhole',
       width: this.width,
@@ -127,7 +174,11 @@ export class MapView {
       cy: this.height / 2 - 0.5,
       distortion: [],
     });
-    return makeView(camera, this.orbit.worldFromCamera());
+    return makeView(camera, this.eye.worldFromCamera());
+  }
+
+  private get aspect(): number {
+    return this.width / Math.max(this.height, 1);
   }
 
   /** Draws if anything changed; true if so. */
@@ -136,26 +187,45 @@ export class MapView {
     this.lastMs = nowMs;
     if (nowMs - this.contentMs >= this.pictureIntervalMs) this.updateContent(nowMs, shown);
     this.steer(shown);
-    if (this.orbit.step(elapsed)) this.dirty = true;
+    if (this.eye.step(elapsed, shown)) this.dirty = true;
     if (!this.dirty || this.width === 0) return false;
     this.dirty = false;
-    this.frustum.resize(this.orbit.distance * FRUSTUM_SHARE);
-    const pose = this.orbit.worldFromCamera();
+    this.aimLens();
+    this.cloud.object.visible = this.showsDots;
+    this.grid.visible = !this.showsSurfaces; // the place has a ground of its own
+    const pictureM = this.eye.pictureM(FRUSTUM_SHARE);
+    this.frustum.resize(pictureM || 1e-6);
+    this.renderer.clear();
+    this.things.lightFor(this.lens);
+    if (this.showsSurfaces) {
+      this.renderer.render(this.surfaceScene, this.lens);
+      this.renderer.render(this.thingScene, this.lens);
+      // Dots lie in surfaces, and the wearer may stand behind one: they are seen all the same.
+      this.renderer.clearDepth();
+      this.renderer.render(this.scene, this.lens);
+      return true;
+    }
+    this.renderer.render(this.scene, this.lens);
+    // After the map, of which known surfaces hide nothing.
+    this.renderer.render(this.thingScene, this.lens);
+    return true;
+  }
+
+  private aimLens(): void {
+    const pose = this.eye.worldFromCamera();
     const p = threeFromWorld(pose.translation);
     const q = threeOrientation(pose);
-    this.eye.position.set(p.x, p.y, p.z);
-    this.eye.quaternion.set(q.x, q.y, q.z, q.w);
-    this.eye.updateMatrixWorld(); // it belongs to the second scene
-    this.renderer.clear();
-    this.renderer.render(this.scene, this.eye);
-    this.things.lightFor(this.eye);
-    // After the map, of which known surfaces hide nothing.
-    this.renderer.render(this.thingScene, this.eye);
-    return true;
+    this.lens.position.set(p.x, p.y, p.z);
+    this.lens.quaternion.set(q.x, q.y, q.z, q.w);
+    this.lens.aspect = this.aspect;
+    this.lens.fov = this.eye.upright(this.aspect);
+    this.lens.updateProjectionMatrix();
+    this.lens.updateMatrixWorld(); // it belongs to the second scene
   }
 
   private updateContent(nowMs: number, shown: ShownFrame | undefined): void {
     this.contentMs = nowMs;
+    if (this.surfaces.update()) this.dirty = true;
     if (this.cloud.update(this.session.map)) this.dirty = true;
     const markers = this.session.pose?.markers ?? [];
     if (this.things.update(markers, this.selectedThing)) this.dirty = true;
@@ -179,7 +249,7 @@ export class MapView {
   /** Follows the wearer where asked to; frames the map by itself until someone takes hold. */
   private steer(shown: ShownFrame | undefined): void {
     if (this.following && shown) {
-      this.orbit.follow(shown.worldFromCamera.translation);
+      this.eye.orbit.follow(shown.worldFromCamera.translation);
       return;
     }
     if (this.held) return;
@@ -190,7 +260,7 @@ export class MapView {
     const grown = framed ? Math.abs(Math.log(bounds.radius / framed.radius)) : Infinity;
     if (moved < 0.3 && grown < 0.3) return;
     this.framed = bounds;
-    this.orbit.lookAt(bounds.centre, bounds.radius);
+    this.eye.orbit.lookAt(bounds.centre, bounds.radius);
   }
 
   /** A sphere round most features and the camera; stray ones do not count. */

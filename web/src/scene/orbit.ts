@@ -63,6 +63,41 @@ export class OrbitCamera {
     this.goal = { ...this.goal, distance: to, target: add(this.goal.target, shift) };
   }
 
+  /** Turns the head by hand [rad]: the eye stays where it is. */
+  look(dYaw: number, dPitch: number): void {
+    const pitch = Math.min(Math.max(this.goal.pitch + dPitch, -MAX_PITCH), MAX_PITCH);
+    const eye = eyeOf(this.goal);
+    this.jump(seenFrom(eye, { ...this.goal, yaw: this.goal.yaw + dYaw, pitch }));
+  }
+
+  /** Walks by hand, at the same height [m]. */
+  walk(right: number, forward: number): void {
+    const [sin, cos] = [Math.sin(this.goal.yaw), Math.cos(this.goal.yaw)];
+    const way = { x: right * cos + forward * sin, y: 0, z: forward * cos - right * sin };
+    this.jump({ ...this.goal, target: add(this.goal.target, way) });
+  }
+
+  /** Eases, or jumps, to stand at `eye` looking along `forward`, with what is `ahead` [m] as target. */
+  stand(eye: Vec3, forward: Vec3, ahead: number, jumps = false): void {
+    const yaw = Math.atan2(forward.x, forward.z);
+    const level = Math.hypot(forward.x, forward.z);
+    const pitch = Math.min(Math.max(Math.atan2(forward.y, level), -MAX_PITCH), MAX_PITCH);
+    const turns = Math.round((this.goal.yaw - yaw) / (2 * Math.PI)) * 2 * Math.PI; // the short way
+    this.goal = seenFrom(eye, { ...this.goal, yaw: yaw + turns, pitch, distance: ahead });
+    if (jumps) this.now = this.goal;
+  }
+
+  /** Eases to look straight down at a sphere [m]. */
+  lookDown(target: Vec3, radius: number): void {
+    this.lookAt(target, radius);
+    this.goal = { ...this.goal, pitch: MAX_PITCH };
+  }
+
+  /** Eases to look down by so much [rad]. */
+  tip(pitch: number): void {
+    this.goal = { ...this.goal, pitch };
+  }
+
   /** Eases to look at a sphere [m]. */
   lookAt(target: Vec3, radius: number): void {
     this.goal = { ...this.goal, target, distance: Math.max(radius, 0.05) * 2.4 };
@@ -92,16 +127,26 @@ export class OrbitCamera {
     this.now = orbit;
   }
 
-  private basis({ yaw, pitch }: Orbit): { x: Vec3; y: Vec3; z: Vec3 } {
-    const z = {
-      x: Math.sin(yaw) * Math.cos(pitch),
-      y: Math.sin(pitch),
-      z: Math.cos(yaw) * Math.cos(pitch),
-    };
+  private basis(orbit: Orbit): { x: Vec3; y: Vec3; z: Vec3 } {
+    const z = forwardOf(orbit);
     const x = normalise(cross({ x: 0, y: 1, z: 0 }, z));
     return { x, y: cross(z, x), z };
   }
 }
+
+const forwardOf = ({ yaw, pitch }: Orbit): Vec3 => ({
+  x: Math.sin(yaw) * Math.cos(pitch),
+  y: Math.sin(pitch),
+  z: Math.cos(yaw) * Math.cos(pitch),
+});
+
+const eyeOf = (orbit: Orbit): Vec3 => add(orbit.target, scale(forwardOf(orbit), -orbit.distance));
+
+/** The same view from `eye`. */
+const seenFrom = (eye: Vec3, orbit: Orbit): Orbit => ({
+  ...orbit,
+  target: add(eye, scale(forwardOf(orbit), orbit.distance)),
+});
 
 /** Of the rotation whose columns are x, y, z. */
 function quaternionOf(x: Vec3, y: Vec3, z: Vec3): Rigid3['rotation'] {

@@ -22,6 +22,7 @@ import { SceneBook } from './scene_book';
 import type { SessionOptions } from './session_options';
 import { silenceWords } from './silence';
 import { sleep } from './sleep';
+import { SurfaceBook } from './surface_book';
 import { TalkState } from './talk_state';
 import type { FrameFacts, Link, Participant, Pose, Scale, Statistics } from './types';
 
@@ -50,6 +51,7 @@ export class Session {
   readonly clock = new ClockOffset();
   readonly talk = new TalkState();
   readonly scene = new SceneBook();
+  readonly surface = new SurfaceBook();
   private readonly reader = new FrameReader();
   private heardMs = 0; // when the stream last told something; 0: not yet
   private lastEventMs = 0;
@@ -188,6 +190,7 @@ export class Session {
     ];
     try {
       void this.ping(signal);
+      void this.surface.follow(this.clients.surface, joined.sessionId, signal);
       void this.talk.catchUp(this.clients.talk, joined.sessionId, signal);
       const stream = this.clients.session.subscribe(
         {
@@ -265,6 +268,9 @@ export class Session {
         break;
       case 'pointer':
         this.pointers.apply(event.value, this.participantId, this.lastEventMs);
+        break;
+      case 'surface':
+        this.surface.apply(event.value);
         break;
       case 'scene':
         this.scene.apply(event.value, this.clients.scene, this.sessionId);

@@ -1,8 +1,18 @@
 import { largestSigma } from '../geometry/covariance';
 import { fitPlane, intersect } from '../geometry/plane';
-import { add, dot, pixelDistance, type Pixel, scale, type Vec3 } from '../geometry/vec3';
+import {
+  add,
+  cross,
+  dot,
+  normalise,
+  pixelDistance,
+  type Pixel,
+  scale,
+  type Vec3,
+} from '../geometry/vec3';
 import { depthOf, eyeOf, projectPoint, rayOf, type View } from '../geometry/view';
 import type { Feature, Target } from '../session/types';
+import type { SurfaceHit } from './surface_rays';
 
 /** Where a click would land, as far as this page can tell before the server decides. */
 export interface Landing {
@@ -14,7 +24,7 @@ export interface Landing {
   readonly depthM: number;
   /** Of the surface there, where one was seen. */
   readonly normalInWorld?: Vec3;
-  readonly how: 'feature' | 'plane' | 'nearby depth' | 'unknown depth';
+  readonly how: 'surface' | 'feature' | 'plane' | 'nearby depth' | 'unknown depth';
 }
 
 const FEATURE_PX = 20; // as the server's (slam-spec section 9): such a feature gives its depth
@@ -41,20 +51,39 @@ export function landingInVideo(
   return guess && { ...guess, target: { kind: 'pixel', frameId, pixel } };
 }
 
+/** What the map shows beside marks, where it is clicked. */
+export interface MapContent {
+  /** Those that are drawn, or that are all there is. */
+  readonly features: Iterable<Feature>;
+  /** What of the place is drawn there. */
+  readonly surface?: SurfaceHit | undefined;
+}
+
+const AGREE_SIGMA = 3;
+
 /**
- * A click on the map: a feature where one is close enough, else the ray into the scene. Nothing where
- * only the depth of places elsewhere could be guessed: in an empty corner nothing is to be seen.
+ * A click on the map, in the server's order (slam-spec section 9): the surface there, but for a feature that is
+ * clicked itself and lies on it; else the ray into the scene. Nothing where only the depth of places elsewhere
+ * could be guessed: in an empty corner nothing is to be seen.
  */
 export function landingInMap(
   view: View,
   pixel: Pixel,
-  features: Iterable<Feature>,
+  { features, surface }: MapContent,
 ): Landing | undefined {
   const seen = seenFrom(view, pixel, features);
   const ray = rayThrough(view, pixel);
-  const guess = guessAt(view, pixel, seen);
   const nearest = seen[0];
-  if (!guess || !ray || !nearest) return undefined;
+  if (!ray) return undefined;
+  if (surface) {
+    const onSurface = { ...ofSurface(view, surface), target: ray };
+    if (!nearest || nearest.away > SNAP_PX) return onSurface;
+    const apart = Math.abs(nearest.depthM - onSurface.depthM);
+    if (apart > AGREE_SIGMA * Math.hypot(sigmaOf(nearest), surface.sigmaM)) return onSurface;
+    return { ...onSurface, ...atFeature(nearest) };
+  }
+  const guess = guessAt(view, pixel, seen);
+  if (!guess || !nearest) return undefined;
   const isGuessed = guess.how === 'nearby depth' || guess.how === 'unknown depth';
   if (isGuessed && nearest.away > NEAR_PX) return undefined;
   if (nearest.away <= SNAP_PX) {
@@ -64,8 +93,26 @@ export function landingInMap(
   return { ...guess, target: ray };
 }
 
+const ofSurface = (view: View, surface: SurfaceHit): Omit<Landing, 'target'> => ({
+  pointInWorld: surface.pointInWorld,
+  sigmaM: surface.sigmaM,
+  depthM: depthOf(view, surface.pointInWorld),
+  normalInWorld: surface.normalInWorld,
+  how: 'surface',
+});
+
+const atFeature = (seen: Seen): Omit<Landing, 'normalInWorld'> => ({
+  target: { kind: 'feature', featureId: seen.feature.id },
+  pointInWorld: seen.feature.pointInWorld,
+  sigmaM: sigmaOf(seen),
+  depthM: seen.depthM,
+  how: 'feature',
+});
+
+type RayTarget = Extract<Target, { kind: 'ray' }>;
+
 /** The ray of a pixel into the scene; undefined outside the lens. */
-export function rayThrough(view: View, pixel: Pixel): Target | undefined {
+export function rayThrough(view: View, pixel: Pixel): RayTarget | undefined {
   const directionInWorld = rayOf(view, pixel);
   return directionInWorld && { kind: 'ray', originInWorld: eyeOf(view), directionInWorld };
 }
@@ -153,6 +200,30 @@ export function ringRadius(view: View, landing: Landing): number | undefined {
   if (landing.sigmaM === undefined) return undefined;
   const { fx, fy } = view.camera.intrinsics;
   return (landing.sigmaM / landing.depthM) * ((fx + fy) / 2);
+}
+
+const RING_POINTS = 24;
+
+/** The ring as it lies in the surface there, and a pin upright in its middle, `times` its size. */
+export interface LyingRing {
+  readonly rim: readonly Vec3[]; // closed
+  readonly pin: readonly [Vec3, Vec3];
+}
+
+/** Undefined where no surface was seen. */
+export function lyingRing(landing: Landing, times: number): LyingRing | undefined {
+  const { pointInWorld: middle, normalInWorld: normal, sigmaM } = landing;
+  if (landing.how !== 'surface' || !normal || sigmaM === undefined) return undefined;
+  const { x, y, z } = normal;
+  const a = normalise(Math.abs(y) < 0.9 ? { x: z, y: 0, z: -x } : { x: 0, y: -z, z: y });
+  const b = cross(normal, a);
+  const radius = times * sigmaM;
+  const rim = Array.from({ length: RING_POINTS + 1 }, (_, i) => {
+    const angle = (2 * Math.PI * i) / RING_POINTS;
+    const way = add(scale(a, Math.cos(angle)), scale(b, Math.sin(angle)));
+    return add(middle, scale(way, radius));
+  });
+  return { rim, pin: [middle, add(middle, scale(normal, radius))] };
 }
 
 /** In words, for beside the ring; without scale in pixels, as there are no metres. */

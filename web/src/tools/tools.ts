@@ -19,6 +19,9 @@ export type HeadCommandName = 'stop' | 'home' | 'level' | 'explore' | 'fast' | '
 /** What happens to the marks as a whole, above their list. */
 export type MarkCommandName = 'mine' | 'hide' | 'snapshot';
 
+/** What of the place the map shows, and from where; one after the other. */
+export type MapCommandName = 'show' | 'stand';
+
 /** What keys alone do, beside the handle of the selected mark. */
 export type TurnName = 'turn_left' | 'turn_right';
 
@@ -224,6 +227,24 @@ export const MARK_COMMANDS: readonly Control<MarkCommandName>[] = [
   },
 ];
 
+/** In the map. */
+export const MAP_COMMANDS: readonly Control<MapCommandName>[] = [
+  {
+    name: 'show',
+    label: 'What the map shows',
+    key: '5',
+    shown: '5',
+    hint: 'surfaces, surfaces and dots, or dots alone',
+  },
+  {
+    name: 'stand',
+    label: 'Where the map is seen from',
+    key: '6',
+    shown: '6',
+    hint: 'all round; walk with W A S D or arrows, drag to look; from above; as the wearer',
+  },
+];
+
 /** Of the selected arrow or box; Shift tips it towards or away instead. */
 export const TURNS: readonly Control<TurnName>[] = [
   {
@@ -249,12 +270,12 @@ export interface Key {
   readonly shiftKey: boolean;
 }
 
-const CONTROLS = [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS, ...MARK_COMMANDS];
+const CONTROLS = [...TOOLS, ...COMMANDS, ...HEAD_COMMANDS, ...MARK_COMMANDS, ...MAP_COMMANDS];
 
 /** The tool or command of a key press; nothing while typing or with Alt. */
 export function controlOf(
   event: Key,
-): ToolName | CommandName | HeadCommandName | MarkCommandName | undefined {
+): ToolName | CommandName | HeadCommandName | MarkCommandName | MapCommandName | undefined {
   const key = event.key.toLowerCase();
   if (event.altKey) return undefined;
   if (event.ctrlKey || event.metaKey) {

@@ -9,6 +9,7 @@ import { PointerService } from '../gen/saccade/v1/pointer_pb';
 import { RecordingService } from '../gen/saccade/v1/recording_pb';
 import { SceneService } from '../gen/saccade/v1/scene_pb';
 import { SessionService } from '../gen/saccade/v1/session_pb';
+import { SurfaceService } from '../gen/saccade/v1/surface_pb';
 import { TalkService } from '../gen/saccade/v1/talk_pb';
 
 export interface Clients {
@@ -20,6 +21,7 @@ export interface Clients {
   readonly pointers: Client<typeof PointerService>;
   readonly recording: Client<typeof RecordingService>;
   readonly scene: Client<typeof SceneService>;
+  readonly surface: Client<typeof SurfaceService>;
   readonly talk: Client<typeof TalkService>;
 }
 
@@ -36,6 +38,7 @@ export function createClients(baseUrl: string, token: () => string = () => ''): 
     pointers: createClient(PointerService, transport),
     recording: createClient(RecordingService, transport),
     scene: createClient(SceneService, transport),
+    surface: createClient(SurfaceService, transport),
     talk: createClient(TalkService, transport),
   };
 }

@@ -55,13 +55,13 @@ export class Aim {
 
   /** `late`: it is asked for some time after the click. */
   landing(pane: PaneName, pixel: Pixel, late = false): Landing | undefined {
-    const features = this.session.map.features.values();
     if (pane === 'map') {
       const view = this.map.view();
-      return view && landingInMap(view, pixel, features);
+      return view && landingInMap(view, pixel, this.map.contentAt(view, pixel));
     }
     const current = this.video.current();
     if (!current?.view) return undefined;
+    const features = this.session.map.features.values();
     const landing = landingInVideo(current.view, current.facts.frameId, pixel, features);
     // A frozen picture is clicked late, a note is placed when its text is done.
     if (!landing || !(late || this.video.frozen) || !this.video.sameMap) return landing;

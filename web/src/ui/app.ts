@@ -46,6 +46,7 @@ import { ThingsPanel } from './things_panel';
 import { ToolNames } from './tool_names';
 import { ToolsColumn } from './tools_column';
 import { VideoPane } from './video_pane';
+import { handleWalking } from './walking';
 
 const MAP_AT_LATEST_MS = 1500;
 const PANEL_MS = 200; // moving numbers change five times a second: readable
@@ -159,6 +160,7 @@ export class App {
     for (const pane of ['map', 'video'] as const) {
       handleDrop(this[pane].element, (x, y, file) => controller.drop(pane, x, y, file));
     }
+    handleWalking(this.map);
     handleKeys(controller, gaze, this.map, this.video, this.help, () => {
       state.sheet = 'marks';
       this.showSheet();

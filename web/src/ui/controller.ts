@@ -86,7 +86,7 @@ export class Controller implements ToolActions, AnnotationActions {
         state.main = state.main === 'map' ? 'video' : 'map';
         break;
       case 'follow':
-        if (map.map) map.map.following = !map.map.following;
+        map.map?.follow(!map.map.following);
         break;
       case 'frame':
         map.map?.frameAll();
@@ -124,6 +124,7 @@ export class Controller implements ToolActions, AnnotationActions {
     else if (this.hand.busy) this.hand.letGo();
     else if (state.tool !== 'select') this.choose('select');
     else if (video.frozen) video.thaw();
+    else if (state.main === 'map' && this.with_.aim.map.walks) this.with_.aim.map.stand('orbit');
     else state.selectedId = undefined;
     state.changed();
   }

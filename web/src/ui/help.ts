@@ -1,4 +1,4 @@
-import { COMMANDS, HEAD_COMMANDS, MARK_COMMANDS, TOOLS, TURNS } from '../tools/tools';
+import { COMMANDS, HEAD_COMMANDS, MAP_COMMANDS, MARK_COMMANDS, TOOLS, TURNS } from '../tools/tools';
 import { FEATURE_CSS, TARGET_CSS } from '../scene/feature_css';
 import type { FeatureState } from '../session/types';
 import { h } from './dom';
@@ -31,6 +31,7 @@ export class Help {
       ...TURNS,
       ...HEAD_COMMANDS,
       ...MARK_COMMANDS,
+      ...MAP_COMMANDS,
     ]) {
       keys.append(h('dt', {}, h('kbd', {}, shown), label), h('dd', {}, hint));
     }
@@ -78,7 +79,7 @@ export class Help {
       h(
         'p',
         {},
-        'Drag to orbit, right-drag or Shift-drag to pan, wheel to zoom; on a touch screen one finger, two fingers, pinch. With the map focused: arrow keys orbit, plus and minus zoom, Enter clicks in the middle. With the video focused: arrow keys move the place that Enter clicks at. Tools that are pressed and moved are held from one Enter to the next.',
+        'Drag to orbit, right-drag or Shift-drag to pan, wheel to zoom; on a touch screen one finger, two fingers, pinch. Where you walk in the map: drag to look, W A S D or two fingers to go, wheel or pinch to go ahead. With the map focused: arrow keys orbit (or walk and turn), plus and minus zoom, Enter clicks in the middle. With the video focused: arrow keys move the place that Enter clicks at. Tools that are pressed and moved are held from one Enter to the next.',
       ),
       task,
       maps,

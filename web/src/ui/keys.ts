@@ -3,6 +3,8 @@ import {
   controlOf,
   HEAD_COMMANDS,
   type HeadCommandName,
+  MAP_COMMANDS,
+  type MapCommandName,
   MARK_COMMANDS,
   type MarkCommandName,
   type ToolName,
@@ -18,12 +20,14 @@ import type { VideoPane } from './video_pane';
 
 const TURN_RAD = 0.12;
 
-type Name = ToolName | CommandName | HeadCommandName | MarkCommandName;
+type Name = ToolName | CommandName | HeadCommandName | MarkCommandName | MapCommandName;
 const isTool = (name: Name): name is ToolName => TOOLS.some((tool) => tool.name === name);
 const isHeadCommand = (name: Name): name is HeadCommandName =>
   HEAD_COMMANDS.some((command) => command.name === name);
 const isMarkCommand = (name: Name): name is MarkCommandName =>
   MARK_COMMANDS.some((command) => command.name === name);
+const isMapCommand = (name: Name): name is MapCommandName =>
+  MAP_COMMANDS.some((command) => command.name === name);
 
 /** Everything the pointer does, by key. */
 export function handleKeys(
@@ -58,6 +62,7 @@ export function handleKeys(
     if (isTool(name)) controller.choose(name);
     else if (isHeadCommand(name)) gaze.run(name);
     else if (isMarkCommand(name)) controller.runMarks(name);
+    else if (isMapCommand(name)) map.next(name);
     else controller.run(name);
   });
   map.element.addEventListener('keydown', (event) => {
@@ -103,27 +108,27 @@ function moveMap(event: KeyboardEvent, pane: MapPane, controller: Controller): b
   const pan = event.shiftKey;
   switch (event.key) {
     case 'ArrowLeft':
-      if (pan) map.orbit.pan(-0.05, 0);
-      else map.orbit.rotate(-TURN_RAD, 0);
+      if (pan) map.eye.pan(-0.05, 0);
+      else map.eye.rotate(-TURN_RAD, 0);
       break;
     case 'ArrowRight':
-      if (pan) map.orbit.pan(0.05, 0);
-      else map.orbit.rotate(TURN_RAD, 0);
+      if (pan) map.eye.pan(0.05, 0);
+      else map.eye.rotate(TURN_RAD, 0);
       break;
     case 'ArrowUp':
-      if (pan) map.orbit.pan(0, -0.05);
-      else map.orbit.rotate(0, TURN_RAD);
+      if (pan) map.eye.pan(0, -0.05);
+      else map.eye.rotate(0, TURN_RAD);
       break;
     case 'ArrowDown':
-      if (pan) map.orbit.pan(0, 0.05);
-      else map.orbit.rotate(0, -TURN_RAD);
+      if (pan) map.eye.pan(0, 0.05);
+      else map.eye.rotate(0, -TURN_RAD);
       break;
     case '+':
     case '=':
-      map.orbit.zoom(0.85);
+      map.eye.zoom(0.85);
       break;
     case '-':
-      map.orbit.zoom(1 / 0.85);
+      map.eye.zoom(1 / 0.85);
       break;
     case 'Enter':
       if (!event.repeat) controller.hand.keyPress('map', event.shiftKey);

@@ -1,23 +1,33 @@
 import { Camera } from '../geometry/camera';
 import type { Pixel } from '../geometry/vec3';
-import { projectPoint, type View } from '../geometry/view';
+import { eyeOf, projectPoint, rayOf, type View } from '../geometry/view';
 import { lineOfSight } from '../scene/gaze_sight';
-import type { MapView, ShownFrame } from '../scene/map_view';
+import type { Look, MapView, ShownFrame } from '../scene/map_view';
+import type { ViewName } from '../scene/viewpoint';
 import { toIntrinsics } from '../session/convert';
 import { gazeKey } from '../session/gaze';
 import type { Session } from '../session/session';
 import { isPlaced, type Pose } from '../session/types';
+import type { MapContent } from '../tools/landing';
+import { hitSurfaces } from '../tools/surface_rays';
 import type { AppState } from './app_state';
 import { h } from './dom';
+import { keepLook, MapControls, nextLook, nextView, recallLook } from './map_controls';
 import { Pane } from './pane';
 import type { PictureCache } from './picture_cache';
 import type { Player } from './player';
 import type { PictureRect } from './pointer_layer';
+import { surfaceWords } from './surface_words';
 
 /** The 3D map: three.js below, the same marks as on the video above it. */
 export class MapPane extends Pane {
   map: MapView | undefined; // arrives after the video: three.js is the larger part of the page
   private readonly canvas: HTMLCanvasElement;
+  private readonly controls = new MapControls({
+    show: (look) => this.show(look),
+    stand: (view) => this.stand(view),
+  });
+  private shows = recallLook();
   private drawnKey = '';
   private lens: Camera | undefined; // as pictures come
 
@@ -26,12 +36,41 @@ export class MapPane extends Pane {
     const words = { className: 'map3d', label: '3D map', title: 'Map' };
     super('map', words, [canvas], session, player, state, pictures);
     this.canvas = canvas;
+    this.element.append(this.controls.element);
+  }
+
+  /** What of the place is drawn, from now on and the next time. */
+  show(look: Look): void {
+    this.shows = look;
+    keepLook(look);
+    if (this.map) this.map.drawn = look;
+    this.state.changed();
+  }
+
+  /** Looks from there; false, and why in words, where that cannot be. */
+  stand(view: ViewName): boolean {
+    const why = this.map ? this.map.look(view, this.eye()) : 'the map is not shown yet';
+    if (why !== undefined) this.state.refuse('map', `Not seen from there: ${why}.`);
+    this.state.changed();
+    return why === undefined;
+  }
+
+  /** The next choice, by key; a view that cannot be is passed over. */
+  next(name: 'show' | 'stand'): void {
+    if (name === 'show') return this.show(nextLook(this.shows));
+    const next = nextView(this.map?.eye.view ?? 'orbit');
+    if (!this.stand(next)) this.stand(nextView(next));
+  }
+
+  get walks(): boolean {
+    return this.map?.eye.turnsHead ?? false;
   }
 
   async load(): Promise<void> {
     try {
       const { MapView: Loaded } = await import('../scene/map_view');
       this.map = new Loaded(this.canvas, this.player.canvas, this.session);
+      this.map.drawn = this.shows;
     } catch (error) {
       const reason = error instanceof Error ? error.message : String(error);
       this.state.refuse('map', `No 3D map: ${reason}`);
@@ -46,9 +85,19 @@ export class MapPane extends Pane {
   lookAt(annotationId: string): void {
     const at = this.session.annotations.get(annotationId)?.anchor.pointInWorld;
     if (!at || !this.map) return;
-    this.map.following = false;
-    this.map.orbit.follow(at);
+    this.map.turnTo(at);
     this.map.hold();
+  }
+
+  /** What is drawn there, and beneath dots that are not drawn. */
+  contentAt(view: View, pixel: Pixel): MapContent {
+    const features = this.session.map.features.values();
+    const { map } = this;
+    const directionInWorld = rayOf(view, pixel);
+    if (!map?.showsSurfaces || !directionInWorld) return { features };
+    const ray = { originInWorld: eyeOf(view), directionInWorld };
+    const surface = hitSurfaces(map.surfaces.meshes(), ray);
+    return { features: surface && !map.showsDots ? [] : features, surface };
   }
 
   /** Where the wearer's camera appears, in CSS pixels of this pane. */
@@ -71,7 +120,7 @@ export class MapPane extends Pane {
     if (!this.map || !view) return;
     const { fx, fy, cx, cy } = view.camera.intrinsics;
     const { u, v } = this.pixelAt(clientX, clientY);
-    this.map.orbit.zoom(factor, (u - cx) / fx, (v - cy) / fy);
+    this.map.eye.zoom(factor, (u - cx) / fx, (v - cy) / fy);
   }
 
   /** `screenFps`: what this computer manages; with little, the map yields to the video. */
@@ -84,6 +133,7 @@ export class MapPane extends Pane {
     map.pictureIntervalMs = screenFps > 0 && screenFps < 45 ? 150 : 0;
     map.selectedThing = this.state.tool === 'thing' ? this.state.thingId : '';
     const moved = map.draw(nowMs, this.eye());
+    this.controls.update(this.shows, map.eye.view);
     this.drawPointers();
     const { version } = this.session.annotations;
     const gaze = gazeKey(this.session.gaze);
@@ -141,10 +191,14 @@ export class MapPane extends Pane {
   private updateNote(): void {
     const refusal = this.state.refusal('map');
     const { map, pose } = this.session;
+    const { map: map3d } = this;
+    const missing = map3d && surfaceWords(this.shows, map3d.surfaces, this.session.surface.state);
     let text = '';
     if (refusal) text = refusal;
-    else if (!this.map) text = 'loading the map';
+    else if (!map3d) text = 'loading the map';
     else if (map.features.size === 0) text = 'nothing mapped yet';
+    else if (missing) text = missing;
+    else if (map3d.eye.view === 'walk') text = 'W A S D or arrows walk, drag to look; Esc ends it';
     else if (pose && !pose.metric) text = 'scale unknown: no target was seen, sizes are relative';
     this.setNote(text);
   }

@@ -132,12 +132,18 @@ export class Painter extends MarkPainter {
   }
 
   /** Where a click lands: a ring as large as its uncertainty [picture px], and how large in words. */
-  ring(at: Pixel, radius: number | undefined, words: string): void {
+  ring(
+    at: Pixel,
+    radius: number | undefined,
+    words: string,
+    lying?: (times: number) => readonly (readonly Pixel[])[],
+  ): void {
     const { context, ratio } = this;
     const size = (radius ?? 0) * this.scale;
     const r = Math.min(Math.max(size, 5 * ratio), MAX_RING_PX * ratio);
     context.beginPath();
-    context.arc(this.x(at), this.y(at), r, 0, 2 * Math.PI);
+    if (lying && size > 0) for (const piece of lying(r / size)) this.line(piece);
+    else context.arc(this.x(at), this.y(at), r, 0, 2 * Math.PI);
     // Dashed: not to scale, the words say how large.
     if (radius === undefined || size > r) context.setLineDash([3 * ratio, 4 * ratio]);
     this.stroke(HALO, 4);

@@ -5,7 +5,7 @@ import { axisStrokes, colourOf, type Mark, pictureGrid, strokesOf } from '../sce
 import { pageNowMs } from '../session/clock';
 import type { Session } from '../session/session';
 import { handleOf } from '../tools/handle';
-import { landingWords, ringRadius } from '../tools/landing';
+import { landingWords, lyingRing, ringRadius } from '../tools/landing';
 import type { AppState, Hover, PaneName } from './app_state';
 import { h, setText } from './dom';
 import { targetLabel } from './gaze_words';
@@ -38,7 +38,7 @@ export abstract class Pane {
     canvases: readonly HTMLElement[],
     protected readonly session: Session,
     protected readonly player: Player,
-    protected readonly state: AppState,
+    readonly state: AppState,
     private readonly pictures: PictureCache,
   ) {
     this.element = h(
@@ -168,6 +168,14 @@ export abstract class Pane {
     if (!pixel) return;
     const { scale, ageMs } = this.session;
     const words = dated(hover.words ?? landingWords(view, hover.landing, scale.metric), ageMs);
-    this.painter.ring(pixel, ringRadius(view, hover.landing), words);
+    const { landing } = hover;
+    const lies = landing.how === 'surface';
+    const lines = (times: number): readonly (readonly Pixel[])[] => {
+      const ring = lyingRing(landing, times);
+      const { camera, cameraFromWorld } = view;
+      const each = ring ? [ring.rim, ring.pin] : [];
+      return each.flatMap((points) => projectPolyline(camera, cameraFromWorld, points));
+    };
+    this.painter.ring(pixel, ringRadius(view, landing), words, lies ? lines : undefined);
   }
 }

@@ -152,11 +152,13 @@ export function handleMapPointer(pane: MapPane, gestures: PaneGestures): void {
     const panning = down.size > 1 || event.shiftKey || (event.buttons & 6) !== 0;
     if (panning) {
       const unit = element.clientHeight * down.size;
-      map.orbit.pan(-dx / unit, -dy / unit);
+      map.eye.pan(-dx / unit, -dy / unit);
       const after = spread(down);
-      if (before > 0 && after > 0) map.orbit.zoom(before / after);
+      if (before > 0 && after > 0) map.eye.zoom(before / after);
     } else {
-      map.orbit.rotate(dx * TURN_RAD_PER_PX, dy * TURN_RAD_PER_PX);
+      // What was taken hold of stays under the pointer where one looks round.
+      const perPx = map.eye.turnsHead ? 1 / map.view().camera.intrinsics.fx : TURN_RAD_PER_PX;
+      map.eye.rotate(dx * perPx, dy * perPx);
     }
     gestures.moved();
   });

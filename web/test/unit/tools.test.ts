@@ -78,18 +78,18 @@ describe('landing', () => {
     ]);
     expect(unknown?.how).toBe('unknown depth');
     expect(unknown && ringRadius(view, unknown)).toBeUndefined();
-    expect(landingInMap(view, { u: 100, v: 100 }, [])).toBeUndefined();
+    expect(landingInMap(view, { u: 100, v: 100 }, { features: [] })).toBeUndefined();
   });
 
   it('lands nowhere in an empty corner of the map, however far the rest reaches', () => {
-    expect(landingInMap(view, { u: 630, v: 20 }, wall)).toBeUndefined();
+    expect(landingInMap(view, { u: 630, v: 20 }, { features: wall })).toBeUndefined();
     expect(landingInVideo(view, 1, { u: 630, v: 20 }, wall)?.how).toBe('nearby depth');
   });
 
   it('in the map names the feature, or the ray', () => {
-    const on = landingInMap(view, { u: 319.5, v: 239.5 }, wall);
+    const on = landingInMap(view, { u: 319.5, v: 239.5 }, { features: wall });
     expect(on?.target.kind).toBe('feature');
-    const beside = landingInMap(view, { u: 344.5, v: 275 }, wall);
+    const beside = landingInMap(view, { u: 344.5, v: 275 }, { features: wall });
     expect(beside?.target).toMatchObject({ kind: 'ray', originInWorld: { x: 0, y: 0, z: 0 } });
   });
 });

@@ -249,6 +249,8 @@ TEST_F(GatewayTest, FilesComeWithSecurityHeadersAndRevalidate) {
   EXPECT_EQ(page.status, 200);
   EXPECT_THAT(page.body, HasSubstr("npm run build"));
   EXPECT_THAT(page.headers.at("content-security-policy"), HasSubstr("default-src 'none'"));
+  EXPECT_THAT(page.headers.at("content-security-policy"),
+              HasSubstr("script-src 'self' 'wasm-unsafe-eval';"));
   EXPECT_EQ(page.headers.at("x-content-type-options"), "nosniff");
   const std::string tag = "If-None-Match: " + page.headers.at("etag") + "\r\n";
   EXPECT_EQ(client.Get("/", tag).status, 304);
