@@ -98,9 +98,14 @@ void AddMachine(CLI::App& app, Options& options) {
       "replay", "What a server has recorded (MCAP), in other forms; needs no server");
   replay->add_option("file", options.replay.file, "Recorded by `saccade recording start`")
       ->required();
-  replay->add_option("--export", options.replay.form, "tum: the poses; ply: the map")->required();
-  replay->add_option("--out", options.out, "Folder for trajectory.tum or map.ply")->required();
-  replay->add_option("--at", options.replay.at, "ply: seconds from its beginning; else its end");
+  replay
+      ->add_option("--export", options.replay.form,
+                   "tum: the poses; ply: the map; glb: surfaces and marks")
+      ->required();
+  replay->add_option("--out", options.out, "Folder for trajectory.tum, map.ply or scene.glb")
+      ->required();
+  replay->add_option("--at", options.replay.at,
+                     "ply, glb: seconds from its beginning; else its end");
   AddMarkers(app, options);
 }
 

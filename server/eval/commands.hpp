@@ -59,8 +59,8 @@ struct RenderArguments {
 };
 struct ReplayArguments {
   std::filesystem::path file, out;
-  std::string form;            // tum or ply
-  std::optional<double> at_s;  // ply: of the recording; nothing: its end
+  std::string form;            // tum, ply or glb
+  std::optional<double> at_s;  // ply, glb: of the recording; nothing: its end
 };
 struct CalibrateArguments {
   std::string source, frames;

@@ -308,11 +308,14 @@ void AddReplay(CLI::App& app, ReplayArguments& arguments) {
   CLI::App* replay =
       app.add_subcommand("replay", "What a server has recorded (MCAP), in other forms");
   replay->add_option("file", arguments.file, "Recorded by `saccade recording start`")->required();
-  replay->add_option("--export", arguments.form, "tum: the poses; ply: the map")
-      ->check(CLI::IsMember({"tum", "ply"}))
+  replay
+      ->add_option("--export", arguments.form,
+                   "tum: the poses; ply: the map; glb: surfaces and marks")
+      ->check(CLI::IsMember({"tum", "ply", "glb"}))
       ->required();
-  replay->add_option("--out", arguments.out, "Folder for trajectory.tum or map.ply")->required();
-  replay->add_option("--at", arguments.at_s, "ply: seconds from its beginning; else its end")
+  replay->add_option("--out", arguments.out, "Folder for trajectory.tum, map.ply or scene.glb")
+      ->required();
+  replay->add_option("--at", arguments.at_s, "ply, glb: seconds from its beginning; else its end")
       ->check(Finite());
 }
 

@@ -10,6 +10,8 @@
 #include "server/eval/output_file.hpp"
 #include "server/eval/trajectory.hpp"
 #include "server/record/recording_reader.hpp"
+#include "shared/marks/shape_lines.hpp"
+#include "shared/models/glb_writer.hpp"
 
 namespace saccade {
 namespace {
@@ -47,6 +49,53 @@ absl::StatusOr<std::string> Ply(RecordingReader& recording, Timestamp at_ns,
   return text;
 }
 
+GlbPart PartOf(const SurfaceSnapshot& surface) {
+  GlbPart part;
+  part.name = "surfaces";
+  for (const auto& [index, chunk] : surface.chunks) {
+    const auto first = static_cast<std::uint32_t>(part.positions.size());
+    for (std::size_t i = 0; i < chunk->positions.size(); ++i) {
+      const auto& rgb = chunk->colors_rgb[i];
+      part.positions.push_back(chunk->Point(i));
+      part.colors_rgba.insert(part.colors_rgba.end(), {rgb[0], rgb[1], rgb[2], 255});
+    }
+    for (const SurfaceChunk::Triangle& triangle : chunk->triangles) {
+      for (const std::uint16_t corner : triangle) part.triangles.push_back(first + corner);
+    }
+  }
+  return part;
+}
+
+/// Named by what its label says.
+GlbPart PartOf(const Annotation& annotation, bool metric) {
+  GlbPart part;
+  part.name = LabelWords(annotation, metric);
+  if (part.name.empty()) part.name = annotation.id;
+  part.color_rgba = annotation.color_rgba;
+  for (const Polyline3& line : ShapeLines(annotation)) {
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      const auto at = static_cast<std::uint32_t>(part.positions.size());
+      if (i > 0) part.lines.insert(part.lines.end(), {at - 1, at});
+      part.positions.push_back(line[i].cast<float>());
+    }
+  }
+  return part;
+}
+
+absl::StatusOr<std::string> Glb(RecordingReader& recording, Timestamp at_ns,
+                                std::size_t& triangles) {
+  const auto scene = recording.SceneAt(at_ns);
+  if (!scene.ok()) return scene.status();
+  std::vector<GlbPart> parts = {PartOf(*scene->surface)};
+  triangles = parts[0].triangles.size() / 3;
+  for (const Annotation& annotation : *scene->annotations) {
+    const bool known =
+        annotation.anchor.place_known && annotation.anchor.state != AnchorState::kStopped;
+    if (known) parts.push_back(PartOf(annotation, scene->metric));
+  }
+  return WriteGlb(parts);
+}
+
 }  // namespace
 
 absl::Status ReplayCommand(const ReplayArguments& arguments) {
@@ -66,12 +115,20 @@ absl::Status ReplayCommand(const ReplayArguments& arguments) {
           : mcap.last_ns();
   if (absl::Status made = CreateFolder(arguments.out); !made.ok()) return made;
   std::size_t count = 0;
-  const bool tum = arguments.form == "tum";
-  const auto text = tum ? Tum(**recording, count) : Ply(**recording, at_ns, count);
-  if (!text.ok()) return text.status();
-  const std::filesystem::path file = arguments.out / (tum ? "trajectory.tum" : "map.ply");
-  if (absl::Status written = WriteFileAtomically(file, *text); !written.ok()) return written;
-  std::cout << file.string() << ": " << count << (tum ? " poses" : " features") << "\n";
+  const bool tum = arguments.form == "tum", glb = arguments.form == "glb";
+  const auto bytes = tum   ? Tum(**recording, count)
+                     : glb ? Glb(**recording, at_ns, count)
+                           : Ply(**recording, at_ns, count);
+  if (!bytes.ok()) return bytes.status();
+  const std::filesystem::path file = arguments.out / (tum   ? "trajectory.tum"
+                                                      : glb ? "scene.glb"
+                                                            : "map.ply");
+  if (absl::Status written = WriteFileAtomically(file, *bytes); !written.ok()) return written;
+  std::cout << file.string() << ": " << count
+            << (tum   ? " poses"
+                : glb ? " triangles"
+                      : " features")
+            << "\n";
   return absl::OkStatus();
 }
 

@@ -9,6 +9,7 @@
 
 #include "saccade/v1/map.pb.h"
 #include "saccade/v1/tracking.pb.h"
+#include "server/record/replayed_state.hpp"
 #include "shared/wire/from_proto.hpp"
 
 namespace saccade {
@@ -16,7 +17,8 @@ namespace {
 
 // Before a moment, the whole state is at most so far away; else farther back, each time twice.
 constexpr Timestamp kLookBack_ns = 12'000'000'000;
-constexpr char kPoseTopic[] = "/saccade/pose", kMapTopic[] = "/saccade/map";
+constexpr char kPoseTopic[] = "/saccade/pose", kMapTopic[] = "/saccade/map",
+               kSurfaceTopic[] = "/saccade/surface", kMarksTopic[] = "/saccade/annotations";
 
 absl::Status NotOurs(absl::string_view topic) {
   return absl::DataLossError(absl::StrCat(topic, ": a message is not as this version writes it"));
@@ -105,6 +107,29 @@ absl::StatusOr<RecordedMap> RecordingReader::MapAt(Timestamp unix_ns) {
   }
   for (auto& [id, feature] : features) map.features.push_back(std::move(feature));
   return map;
+}
+
+absl::StatusOr<RecordedScene> RecordingReader::SceneAt(Timestamp unix_ns) {
+  ReplayedState state;
+  state.Restart();
+  RecordedScene scene;
+  absl::Status bad;
+  const auto take = [&](const McapReader::Message& from) {
+    if (!bad.ok()) return;
+    if (from.topic == kPoseTopic) {
+      v1::PoseEvent pose;
+      if (Parse(from, pose)) scene.metric = pose.metric();
+    } else if (from.topic == kSurfaceTopic || from.topic == kMarksTopic) {
+      bad = state.Take(from, nullptr);
+    }
+  };
+  // Every ten seconds each chunk and the whole list are told again.
+  const Timestamp from_ns = std::max(mcap_->first_ns(), unix_ns - 2 * kLookBack_ns);
+  if (absl::Status read = mcap_->Read(from_ns, unix_ns, take); !read.ok()) return read;
+  if (!bad.ok()) return bad;
+  scene.surface = state.surface();
+  scene.annotations = state.annotations();
+  return scene;
 }
 
 }  // namespace saccade

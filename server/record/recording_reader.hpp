@@ -10,7 +10,9 @@
 
 #include "server/record/mcap_reader.hpp"
 #include "shared/geometry/rigid3.hpp"
+#include "shared/scene/annotation.hpp"
 #include "shared/scene/map_snapshot.hpp"
+#include "shared/scene/surface_snapshot.hpp"
 
 namespace saccade {
 
@@ -25,6 +27,13 @@ struct RecordedMap {
   bool metric = false;
 };
 
+/// What people saw of the place at one moment.
+struct RecordedScene {
+  std::shared_ptr<const SurfaceSnapshot> surface;              // never null
+  std::shared_ptr<const std::vector<Annotation>> annotations;  // never null
+  bool metric = false;
+};
+
 /// A recording as what it is of: poses, and the map at any time. One thread.
 class RecordingReader {
  public:
@@ -36,6 +45,8 @@ class RecordingReader {
   absl::StatusOr<std::vector<RecordedPose>> Poses();
   /// As it was known then, from the last whole state before it. DataLoss: as above.
   absl::StatusOr<RecordedMap> MapAt(Timestamp unix_ns);
+  /// Surfaces and marks as they were then. DataLoss: as above.
+  absl::StatusOr<RecordedScene> SceneAt(Timestamp unix_ns);
 
  private:
   explicit RecordingReader(std::unique_ptr<McapReader> mcap) : mcap_(std::move(mcap)) {}

@@ -172,6 +172,7 @@ async function exported(file, read) {
     });
   const tum = await run('--export', 'tum');
   const ply = await run('--export', 'ply');
+  const glb = await run('--export', 'glb');
   const lines = (name) => readFileSync(join(out, name), 'utf8').trim().split('\n');
   const poses =
     tum.code === 0 ? lines('trajectory.tum').filter((each) => !each.startsWith('#')) : [];
@@ -185,6 +186,16 @@ async function exported(file, read) {
       vertices > 0 &&
       Math.abs(vertices - points) <= 0.6 * points,
     `${poses.length} poses, ${vertices} features where the last cloud has ${points}; ${tum.text.trim()}`,
+  );
+  const told = read.of('/saccade/surface').flatMap(({ value }) => value.chunks);
+  if (!told.some(({ triangleCount }) => triangleCount > 0)) return; // none was found yet
+  const file0 = glb.code === 0 ? readFileSync(join(out, 'scene.glb')) : Buffer.alloc(20);
+  const words = file0.subarray(20, 20 + file0.readUInt32LE(12)).toString();
+  const triangles = Number(/: (\d+) triangles/.exec(glb.text)?.[1] ?? 0);
+  check(
+    'surfaces and marks are exported as glTF',
+    file0.subarray(0, 4).toString() === 'glTF' && /"surfaces"/.test(words) && triangles > 0,
+    glb.text.trim(),
   );
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "shared/models/glb_writer.hpp"
 #include "tests/unit/server/scene/glb_builder.hpp"
 
 namespace saccade::gltf_reader_test {
@@ -39,6 +40,29 @@ TEST(ReadGlb, AppliesTheTransformsOfNodesAndColours) {
   EXPECT_EQ(mesh->positions[1], Eigen::Vector3f(8, 0, 0));
   EXPECT_EQ(mesh->triangles[0], (TriangleMesh::Triangle{0, 2, 1}));  // mirrored: turned over
   EXPECT_EQ(mesh->colors_rgba[0], 0xff0000ffu);
+}
+
+TEST(WriteGlb, WhatIsWrittenIsReadBackWithItsColours) {
+  GlbPart red;
+  red.name = "shelf";
+  red.positions = {{0, 0, 1}, {1, 0, 1}, {0, 2, 1}};
+  red.triangles = {0, 1, 2};
+  red.color_rgba = 0xbc000080;
+  GlbPart coloured = red;
+  coloured.name = "surfaces";
+  coloured.colors_rgba = {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255};
+  GlbPart line;
+  line.positions = {{0, 0, 0}, {0, 0, 3}};
+  line.lines = {0, 1};
+  const absl::StatusOr<std::string> bytes = WriteGlb({red, coloured, line, GlbPart()});
+  ASSERT_TRUE(bytes.ok()) << bytes.status();
+  EXPECT_EQ(bytes->substr(0, 4), "glTF");
+  const absl::StatusOr<TriangleMesh> mesh = ReadGlb(*bytes);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ASSERT_EQ(mesh->triangles.size(), 2u);  // lines have none
+  EXPECT_LT((mesh->positions[2] - Eigen::Vector3f(0, 2, 1)).norm(), 1e-6f);
+  EXPECT_EQ(mesh->triangles[0], (TriangleMesh::Triangle{0, 1, 2}));
+  EXPECT_FALSE(WriteGlb({}).ok());
 }
 
 TEST(ReadGlb, TornAtAnyByteIsRefused) {
