@@ -204,8 +204,12 @@ void Engine::Track(Frame frame) {
   last_ = std::move(next);
   if (options_.calibration) options_.calibration->OnFrame(step.frame);
   // What nobody may see is in no surface either.
-  if (options_.surfaces && pictures_->MayShow(step.frame->id).ok()) {
-    options_.surfaces->OnFrame(step.frame, wearable_->tracker().keyframes());
+  if (options_.surfaces) {
+    if (step.restored) options_.surfaces->Restore(step.restored);
+    options_.surfaces->OnMap(step.snapshot->map_generation);
+    if (pictures_->MayShow(step.frame->id).ok()) {
+      options_.surfaces->OnFrame(step.frame, wearable_->tracker().keyframes());
+    }
   }
   for (const AnchorMoved& moved : step.moved) {
     Log(absl::StrFormat("anchor %s moved %.1f mm: %s", moved.id, 1e3 * moved.delta_in_world.norm(),

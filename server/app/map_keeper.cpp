@@ -51,8 +51,9 @@ void MapKeeper::Tick() {
 void MapKeeper::KeepIfNew(const StoredWorld& stored) {
   const auto& keyframes = stored.map->keyframes.keyframes;
   const std::int64_t newest = keyframes.empty() ? -1 : keyframes.rbegin()->first;
+  const std::uint64_t surface = stored.surface ? stored.surface->version : 0;
   if (stored.world == kept_world_ && newest == kept_keyframe_ &&
-      stored.map->places.size() == kept_places_) {
+      stored.map->places.size() == kept_places_ && surface == kept_surface_) {
     return;
   }
   if (absl::Status written = Write(stored, stored.world, ""); !written.ok()) {
@@ -62,6 +63,7 @@ void MapKeeper::KeepIfNew(const StoredWorld& stored) {
   kept_world_ = stored.world;
   kept_keyframe_ = newest;
   kept_places_ = stored.map->places.size();
+  kept_surface_ = surface;
   shelf_.Thin(options_.most_without_name);
 }
 
@@ -72,7 +74,7 @@ absl::Status MapKeeper::Write(const StoredWorld& stored, const std::string& id,
   facts.name = name;
   facts.world = stored.world;
   facts.saved_unix_s = std::time(nullptr);
-  return shelf_.Save(std::move(facts), *stored.map);
+  return shelf_.Save(std::move(facts), *stored.map, stored.surface.get());
 }
 
 void MapKeeper::Drain() {
@@ -107,7 +109,8 @@ absl::StatusOr<std::optional<StoredWorld>> MapKeeper::ReadFirst(const std::strin
   }
   absl::StatusOr<KeptMap> kept = shelf_.Load(wanted);
   if (!kept.ok()) return kept.status();
-  return StoredWorld{std::make_shared<const StoredMap>(std::move(kept->map)), kept->facts.world};
+  return StoredWorld{std::make_shared<const StoredMap>(std::move(kept->map)), kept->facts.world,
+                     std::move(kept->surface)};
 }
 
 void MapKeeper::List(Done<std::vector<KeptMapFacts>> done) {
@@ -136,7 +139,8 @@ void MapKeeper::Load(std::string id, DoneEmpty done) {
   const auto resume = [this, id = std::move(id), done] {
     absl::StatusOr<KeptMap> kept = shelf_.Load(id);
     if (!kept.ok()) return done(kept.status());
-    StoredWorld stored{std::make_shared<const StoredMap>(std::move(kept->map)), kept->facts.world};
+    StoredWorld stored{std::make_shared<const StoredMap>(std::move(kept->map)), kept->facts.world,
+                       std::move(kept->surface)};
     if (absl::Status asked = port_->Submit(ResumeMap{std::move(stored), done}); !asked.ok()) {
       done(asked);
     }

@@ -66,6 +66,7 @@ class MapKeeper final : public KeptMaps {
   std::string kept_world_;
   std::int64_t kept_keyframe_ = -1;
   std::size_t kept_places_ = 0;
+  std::uint64_t kept_surface_ = 0;  // version
   Runner<std::function<void()>> work_;
 };
 

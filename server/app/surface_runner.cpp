@@ -65,6 +65,30 @@ void SurfaceRunner::OnFrame(const std::shared_ptr<const Frame>& frame,
   changed_.notify_one();
 }
 
+void SurfaceRunner::Restore(std::shared_ptr<const SurfaceSnapshot> before) {
+  last_generation_ = before->generation;
+  {
+    const std::lock_guard lock(mutex_);
+    seen_.clear();
+    places_.reset();
+    restored_ = std::move(before);
+  }
+  changed_.notify_one();
+}
+
+void SurfaceRunner::OnMap(std::uint64_t generation) {
+  if (std::exchange(last_generation_, generation) == generation) return;
+  auto none = std::make_shared<KeyframePlaces>();
+  none->generation = generation;
+  {
+    const std::lock_guard lock(mutex_);
+    seen_.clear();
+    restored_.reset();
+    places_ = std::move(none);
+  }
+  changed_.notify_one();
+}
+
 std::shared_ptr<const SurfaceSnapshot> SurfaceRunner::newest() const {
   const std::lock_guard lock(mutex_);
   return newest_;
@@ -73,11 +97,14 @@ std::shared_ptr<const SurfaceSnapshot> SurfaceRunner::newest() const {
 bool SurfaceRunner::TakeNews() {
   std::deque<KeyframeSeen> seen;
   std::shared_ptr<const KeyframePlaces> places;
+  std::shared_ptr<const SurfaceSnapshot> restored;
   {
     const std::lock_guard lock(mutex_);
     seen.swap(seen_);
     places.swap(places_);
+    restored.swap(restored_);
   }
+  if (restored) map_->Restore(*restored);
   for (const KeyframeSeen& one : seen) {
     if (map_->Wants(one.frame->id, *one.places)) map_->Add(*one.frame, *one.places);
   }
@@ -125,7 +152,7 @@ void SurfaceRunner::Run(std::stop_token stop) {
     if (worked) continue;
     std::unique_lock lock(mutex_);
     changed_.wait_until(lock, stop, looked + kPlacesEvery, [] { return false; });
-    changed_.wait(lock, stop, [this] { return !seen_.empty() || places_; });
+    changed_.wait(lock, stop, [this] { return !seen_.empty() || places_ || restored_; });
   }
 }
 

@@ -35,6 +35,11 @@ class SurfaceRunner {
   void Start(Published published);
   void Stop();
 
+  /// What the place of a map that was brought back looked like, as generation `before->generation`
+  /// has it. The tracker's thread.
+  void Restore(std::shared_ptr<const SurfaceSnapshot> before);
+  /// The map of now: surfaces of another one are gone. The tracker's thread.
+  void OnMap(std::uint64_t generation);
   /// After each frame that was tracked, on the tracker's thread: two pointers are compared.
   void OnFrame(const std::shared_ptr<const Frame>& frame,
                std::shared_ptr<const KeyframePlaces> places);
@@ -60,11 +65,13 @@ class SurfaceRunner {
   const std::uint64_t first_edition_;
   Published published_;
   std::shared_ptr<const KeyframePlaces> last_places_;  // the tracker's thread
+  std::uint64_t last_generation_ = 0;                  // likewise
   std::unique_ptr<SurfaceMap> map_;                    // the runner's thread
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<KeyframeSeen> seen_;
-  std::shared_ptr<const KeyframePlaces> places_;  // null: as they were
+  std::shared_ptr<const KeyframePlaces> places_;     // null: as they were
+  std::shared_ptr<const SurfaceSnapshot> restored_;  // null: nothing was
   std::shared_ptr<const SurfaceSnapshot> newest_;
   std::jthread thread_;
 };

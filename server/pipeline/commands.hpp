@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "shared/scene/annotation.hpp"
+#include "shared/scene/surface_snapshot.hpp"
 
 namespace saccade {
 
@@ -53,8 +54,9 @@ struct ResetMap {
 };
 /// A map that outlives the run, and whose coordinates it has.
 struct StoredWorld {
-  std::shared_ptr<const StoredMap> map;  // never null
-  std::string world;                     // UUID
+  std::shared_ptr<const StoredMap> map;                      // never null
+  std::string world;                                         // UUID
+  std::shared_ptr<const SurfaceSnapshot> surface = nullptr;  // null: none is known
 };
 struct StoreMap {
   Done<StoredWorld> done;  // FailedPrecondition: too little is mapped yet

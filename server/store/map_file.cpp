@@ -8,12 +8,13 @@
 #include <optional>
 
 #include "server/map/archive.hpp"
+#include "server/store/surface_archive.hpp"
 
 namespace saccade {
 namespace {
 
 constexpr absl::string_view kMagic("SACCADE MAP\n");
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;  // 1: without surfaces
 constexpr absl::string_view kRemedy = "is damaged: restore it, or remove it";
 
 template <typename Archive>
@@ -92,10 +93,10 @@ bool IsShownName(absl::string_view name) {
 }
 
 /// Takes everything before the map itself off the front of `bytes`.
-absl::StatusOr<KeptMapFacts> TakeFacts(absl::string_view name, absl::string_view& bytes) {
+absl::StatusOr<KeptMapFacts> TakeFacts(absl::string_view name, absl::string_view& bytes,
+                                       std::uint32_t& version) {
   if (!absl::ConsumePrefix(&bytes, kMagic)) return DamagedMap(name, "is no map of saccade's");
   ArchiveReader head(bytes.substr(0, sizeof(kVersion)));
-  std::uint32_t version = 0;
   head.Number(version);
   if (!head.ok()) return DamagedMap(name, "is cut short");
   bytes.remove_prefix(sizeof(kVersion));
@@ -127,7 +128,8 @@ bool IsMapId(absl::string_view id) {
          });
 }
 
-std::string EncodeMapFile(KeptMapFacts& facts, const StoredMap& map) {
+std::string EncodeMapFile(KeptMapFacts& facts, const StoredMap& map,
+                          const SurfaceSnapshot* surface) {
   facts.metric = map.metric;
   facts.landmarks = static_cast<std::uint32_t>(map.known.size() + map.at_rest.size());
   facts.places = static_cast<std::uint32_t>(map.places.size());
@@ -137,29 +139,38 @@ std::string EncodeMapFile(KeptMapFacts& facts, const StoredMap& map) {
   Fields(writer, facts);
   std::string file(kMagic);
   ArchiveWriter version;
-  std::uint32_t number = kVersion;
+  std::uint32_t number = surface == nullptr ? 1 : kVersion;  // who reads no surfaces reads that
   version.Number(number);
   file += version.Take();
   Append(file, writer.Take());
   Append(file, EncodeMap(map));
+  if (surface != nullptr) Append(file, EncodeSurface(*surface));
   facts.bytes = file.size();
   return file;
 }
 
 absl::StatusOr<KeptMapFacts> DecodeMapFacts(absl::string_view name, absl::string_view begin) {
-  return TakeFacts(name, begin);
+  std::uint32_t version = 0;
+  return TakeFacts(name, begin, version);
 }
 
 absl::StatusOr<KeptMap> DecodeMapFile(absl::string_view name, absl::string_view file) {
   absl::string_view rest = file;
-  absl::StatusOr<KeptMapFacts> facts = TakeFacts(name, rest);
+  std::uint32_t version = 0;
+  absl::StatusOr<KeptMapFacts> facts = TakeFacts(name, rest, version);
   if (!facts.ok()) return facts.status();
   const auto part = TakePart(rest);
+  std::shared_ptr<const SurfaceSnapshot> surface;
+  if (part && version >= 2) {
+    const auto bytes = TakePart(rest);
+    surface = bytes ? DecodeSurface(*bytes) : nullptr;
+    if (surface == nullptr) return DamagedMap(name, kRemedy);
+  }
   if (!part || !rest.empty()) return DamagedMap(name, kRemedy);
   absl::StatusOr<StoredMap> map = DecodeMap(*part);
   if (!map.ok()) return DamagedMap(name, map.status().message());
   facts->bytes = file.size();
-  return KeptMap{*std::move(facts), *std::move(map)};
+  return KeptMap{*std::move(facts), *std::move(map), std::move(surface)};
 }
 
 }  // namespace saccade

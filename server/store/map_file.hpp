@@ -4,10 +4,12 @@
 #include <absl/strings/string_view.h>
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "server/map/stored_map.hpp"
 #include "server/pipeline/kept_maps.hpp"
+#include "shared/scene/surface_snapshot.hpp"
 
 namespace saccade {
 
@@ -20,6 +22,7 @@ inline constexpr std::size_t kLongestMapName = 200;  // [bytes]
 struct KeptMap {
   KeptMapFacts facts;
   StoredMap map;
+  std::shared_ptr<const SurfaceSnapshot> surface;  // null: none is kept with it
 };
 
 /// CRC-32 of zlib; of the whole, if `before` is that of what comes before `bytes`.
@@ -29,7 +32,9 @@ std::uint32_t MapChecksum(absl::string_view bytes, std::uint32_t before = 0);
 bool IsMapId(absl::string_view id);
 
 /// The bytes of a file (docs/design/maps.md). What `facts` says of its content is filled in.
-std::string EncodeMapFile(KeptMapFacts& facts, const StoredMap& map);
+/// `surface`: null, or of that map.
+std::string EncodeMapFile(KeptMapFacts& facts, const StoredMap& map,
+                          const SurfaceSnapshot* surface = nullptr);
 
 /// Facts from the beginning of a file, without its `bytes`. DataLoss: damaged, or of a later
 /// version; says so after `name`.

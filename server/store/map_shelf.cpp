@@ -70,9 +70,10 @@ std::vector<KeptMapFacts> MapShelf::List() {
   return all;
 }
 
-absl::Status MapShelf::Save(KeptMapFacts facts, const StoredMap& map) {
+absl::Status MapShelf::Save(KeptMapFacts facts, const StoredMap& map,
+                            const SurfaceSnapshot* surface) {
   if (absl::Status made = PrepareDirectory(directory_); !made.ok()) return made;
-  const std::string file = EncodeMapFile(facts, map);
+  const std::string file = EncodeMapFile(facts, map, surface);
   if (const int failed = WritePrivateFile(FileOf(facts.id), file); failed != 0) {
     return StoreFileError(FileOf(facts.id), failed);
   }

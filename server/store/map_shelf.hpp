@@ -21,7 +21,8 @@ class MapShelf {
   std::vector<KeptMapFacts> List();
   /// Writes `map` under `facts.id`, in place of what was there; what `facts` says of its content is
   /// filled in. Unavailable: the disk, with the reason.
-  absl::Status Save(KeptMapFacts facts, const StoredMap& map);
+  absl::Status Save(KeptMapFacts facts, const StoredMap& map,
+                    const SurfaceSnapshot* surface = nullptr);
   ///   InvalidArgument  no id of a map
   ///   NotFound         there is no such map
   ///   DataLoss         damaged, or of a later version; names the file

@@ -7,6 +7,11 @@
 #include "server/surface/view_choice.hpp"
 
 namespace saccade {
+namespace {
+
+constexpr double kSeenAgain = 0.4;  // of a chunk's triangles: then what was before is gone
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<SurfaceMap>> SurfaceMap::Create(const SurfaceOptions& options) {
   if (absl::Status status = options.Validate(); !status.ok()) return status;
@@ -52,12 +57,49 @@ void SurfaceMap::ForgetFusion() {
 void SurfaceMap::ForgetAll() {
   kept_.clear();
   places_.clear();
+  ForgetRestored();
   ForgetFusion();
+}
+
+void SurfaceMap::ForgetRestored() {
+  if (!restored_.empty()) ++edition_;
+  restored_.clear();
+  restored_voxel_ = 0.0f;
+}
+
+void SurfaceMap::Restore(const SurfaceSnapshot& before) {
+  ForgetAll();
+  generation_ = before.generation;
+  restored_voxel_ = before.voxel;
+  restored_unit_ = false;
+  ++edition_;
+  for (const auto& [index, chunk] : before.chunks) {
+    SurfaceChunk copy = *chunk;
+    copy.version = ++version_;
+    restored_[index] = std::make_shared<const SurfaceChunk>(std::move(copy));
+  }
+}
+
+SurfaceSnapshot SurfaceMap::Snapshot() {
+  SurfaceSnapshot snapshot{generation_, edition_, version(), voxel(), chunks()};
+  for (auto before = restored_.begin(); before != restored_.end();) {
+    const auto& [index, chunk] = *before;
+    auto& now = snapshot.chunks[index];
+    const bool seen_again = now && static_cast<double>(now->triangles.size()) >
+                                       kSeenAgain * static_cast<double>(chunk->triangles.size());
+    if (!seen_again) now = chunk;
+    before = seen_again ? restored_.erase(before) : std::next(before);
+  }
+  return snapshot;
 }
 
 void SurfaceMap::SetPlaces(const KeyframePlaces& places) {
   if (places.generation != generation_) ForgetAll();
-  if (places.metric != metric_) ForgetFusion();  // another unit
+  if (places.metric != metric_) {  // another unit
+    if (restored_unit_) ForgetRestored();
+    ForgetFusion();
+  }
+  restored_unit_ = true;
   generation_ = places.generation;
   metric_ = places.metric;
   std::map<std::int64_t, KeyframePlace> now;

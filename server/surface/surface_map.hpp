@@ -40,6 +40,9 @@ class SurfaceMap {
   void Add(const Frame& frame, const KeyframePlaces& places);
   /// Takes the keyframes' places: they may have moved, gone, or be of another map.
   void SetPlaces(const KeyframePlaces& places);
+  /// What the place looked like in a run before, in this map's coordinates: shown until as much is
+  /// seen again.
+  void Restore(const SurfaceSnapshot& before);
   /// The next step of what is to be done, at most some hundred milliseconds; false: nothing is.
   bool Work();
 
@@ -49,13 +52,13 @@ class SurfaceMap {
   std::uint64_t edition() const { return edition_; }
   std::uint64_t version() const { return fusion_ ? fusion_->version() : version_; }
   /// All of it as it is now, to be handed to other threads.
-  SurfaceSnapshot Snapshot() const { return {generation_, edition_, version(), voxel(), chunks()}; }
+  SurfaceSnapshot Snapshot();
   const SurfaceCost& cost() const { return cost_; }
   /// Of pictures, depths, voxels and chunks.
   std::size_t bytes() const;
   std::size_t blocks() const { return fusion_ ? fusion_->voxels().size() : 0; }
   /// In the map's unit; 0 before the first.
-  float voxel() const { return fusion_ ? fusion_->voxels().voxel() : 0.0f; }
+  float voxel() const { return fusion_ ? fusion_->voxels().voxel() : restored_voxel_; }
 
   /// A keyframe that is kept, for evaluation.
   struct KeptView {
@@ -87,6 +90,7 @@ class SurfaceMap {
       : options_(options), rectifier_(options.width_px) {}
   void ForgetAll();
   void ForgetFusion();
+  void ForgetRestored();
   void Follow(Kept& kept, const std::map<std::int64_t, KeyframePlace>& now) const;
   double Moved(const Kept& kept) const;
   std::vector<std::int64_t> ViewsOf(std::int64_t id, const Kept& kept) const;
@@ -105,6 +109,9 @@ class SurfaceMap {
   Rectifier rectifier_;
   std::uint64_t generation_ = 0, edition_ = 0, version_ = 0;
   bool metric_ = false;
+  SurfaceSnapshot::Chunks restored_;  // what is not seen again yet
+  float restored_voxel_ = 0.0f;       // 0: nothing was restored
+  bool restored_unit_ = false;        // whether it is known if that was in metres
   std::map<std::int64_t, KeyframePlace> places_;
   std::map<std::int64_t, Kept> kept_;
   std::unique_ptr<SurfaceFusion> fusion_;

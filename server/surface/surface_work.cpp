@@ -9,11 +9,11 @@
 namespace saccade {
 namespace {
 
-constexpr std::size_t kMostAsked = 10;  // keyframes that confirm one
-constexpr double kSweptAgain_px = 0.7;  // of a small picture, that a view has moved
-constexpr double kFarFromAsked = 0.6;   // of the distance
-constexpr int kFollowEvery = 8;         // keyframes
-constexpr double kFarMoved = 3.0;       // times what is worth following: at once
+constexpr std::size_t kMostAsked = 10;     // keyframes that confirm one
+constexpr double kSweptAgain_px = 0.7;     // of a small picture, that a view has moved
+constexpr double kFarFromAsked = 0.6;      // of the distance
+constexpr int kFollowEvery = 8;            // keyframes
+constexpr double kFarMoved = 3.0;          // times what is worth following: at once
 constexpr int kConfirmedAt[] = {2, 4, 8};  // keyframes asked: then it is done again
 
 }  // namespace
@@ -199,7 +199,8 @@ void SurfaceMap::Confirm(std::int64_t id, Kept& kept) {
 void SurfaceMap::Fuse(std::int64_t id, Kept& kept, const DepthMap& depth) {
   const double begin_ms = ThreadCpuMs();
   if (!fusion_) {
-    const double voxel = metric_ ? options_.voxel_m : options_.voxel_share * kept.place.distance_m;
+    const double fresh = metric_ ? options_.voxel_m : options_.voxel_share * kept.place.distance_m;
+    const double voxel = restored_voxel_ > 0.0f ? restored_voxel_ : fresh;
     fusion_ = std::make_unique<SurfaceFusion>(static_cast<float>(voxel), options_);
     fusion_->StartVersionsAt(version_);
   }

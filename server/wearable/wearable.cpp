@@ -51,6 +51,11 @@ const WearableStep& Wearable::Step(Frame frame) {
   if (generation_ != step.snapshot->map_generation) {
     generation_ = step.snapshot->map_generation;
     world_ = resuming_.empty() ? MakeUuid() : std::exchange(resuming_, "");
+    if (const auto before = std::exchange(resuming_surface_, nullptr)) {
+      auto restored = std::make_shared<SurfaceSnapshot>(*before);
+      restored->generation = *generation_;
+      step.restored = std::move(restored);
+    }
     book_->SetWorld(world_);
   }
   step.moved = book_->OnSnapshot(step.snapshot, *step.frame->camera);
@@ -113,7 +118,10 @@ void Wearable::ResetTracker(const ResetMap& command) {
 
 absl::StatusOr<StoredWorld> Wearable::Store() const {
   std::shared_ptr<const StoredMap> map = tracker_->Store();
-  if (map && !world_.empty()) return StoredWorld{std::move(map), world_};
+  if (map && !world_.empty()) {
+    const bool same = surface_ && generation_ == surface_->generation && !surface_->chunks.empty();
+    return StoredWorld{std::move(map), world_, same ? surface_ : nullptr};
+  }
   return absl::FailedPreconditionError(
       "too little is mapped yet to come back to: look round for some seconds first");
 }
@@ -121,6 +129,7 @@ absl::StatusOr<StoredWorld> Wearable::Store() const {
 absl::Status Wearable::Resume(const StoredWorld& stored) {
   if (absl::Status status = tracker_->Resume(stored.map); !status.ok()) return status;
   resuming_ = stored.world;
+  resuming_surface_ = stored.surface;
   generation_.reset();
   return absl::OkStatus();
 }

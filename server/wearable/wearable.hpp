@@ -26,7 +26,9 @@ struct WearableStep {
   std::shared_ptr<const Frame> frame;
   std::shared_ptr<const MapSnapshot> snapshot;
   std::vector<AnchorMoved> moved;  // anchors that jumped
-  FrameCost cost;                  // of the tracker alone
+  /// A stored map was brought back with this frame, and that is what its place looked like.
+  std::shared_ptr<const SurfaceSnapshot> restored;
+  FrameCost cost;  // of the tracker alone
 };
 
 /// One wearable without threads: a frame goes through tracker, frame ring and anchors, a command
@@ -91,7 +93,8 @@ class Wearable {
   std::shared_ptr<const SurfaceSnapshot> surface_;  // null: none is known
   std::string world_;                               // UUID of the map's coordinates
   std::string resuming_;  // of the map that the tracker looks for, until the next frame
-  std::optional<std::uint64_t> generation_;  // that world_ is of
+  std::shared_ptr<const SurfaceSnapshot> resuming_surface_;  // its, likewise
+  std::optional<std::uint64_t> generation_;                  // that world_ is of
 };
 
 }  // namespace saccade

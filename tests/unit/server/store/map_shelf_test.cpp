@@ -120,6 +120,50 @@ class MapShelfTest : public ::testing::Test {
   fs::path folder_;
 };
 
+TEST_F(MapShelfTest, SurfacesGoWithTheirMapAndDamageInThemIsFound) {
+  SurfaceChunk chunk;
+  chunk.index = {-1, 0, 2};
+  chunk.origin_in_world = {-0.5f, 0.0f, 1.0f};
+  chunk.step_m = 0.001f;
+  chunk.positions = {{0, 0, 0}, {9, 0, 0}, {0, 9, 1}};
+  chunk.colors_rgb = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  chunk.triangles = {{0, 1, 2}};
+  SurfaceSnapshot surface;
+  surface.voxel = 0.015f;
+  surface.chunks[chunk.index] = std::make_shared<const SurfaceChunk>(chunk);
+  surface.chunks[{7, 7, 7}] = std::make_shared<const SurfaceChunk>();  // nothing is there any more
+
+  MapShelf shelf(folder_);
+  KeptMapFacts facts;
+  facts.id = facts.world = kFirst;
+  ASSERT_TRUE(shelf.Save(facts, SmallMap(), &surface).ok());
+  const auto kept = shelf.Load(kFirst);
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  ASSERT_NE(kept->surface, nullptr);
+  EXPECT_EQ(kept->surface->voxel, 0.015f);
+  ASSERT_EQ(kept->surface->chunks.size(), 1U);
+  const SurfaceChunk& read = *kept->surface->chunks.at(chunk.index);
+  EXPECT_EQ(read.positions, chunk.positions);
+  EXPECT_EQ(read.colors_rgb, chunk.colors_rgb);
+  EXPECT_EQ(read.triangles, chunk.triangles);
+  EXPECT_EQ(read.origin_in_world, chunk.origin_in_world);
+  ASSERT_EQ(shelf.List().size(), 1U);
+
+  const std::string good = Read(kFirst);
+  for (std::size_t back = 1; back < 90; back += 4) {
+    std::string bad = good;
+    bad[bad.size() - back] = static_cast<char>(~bad[bad.size() - back]);
+    Write(kFirst, bad);
+    EXPECT_TRUE(absl::IsDataLoss(shelf.Load(kFirst).status())) << back;
+  }
+  Write(kFirst, good.substr(0, good.size() - 1));
+  EXPECT_TRUE(absl::IsDataLoss(shelf.Load(kFirst).status()));
+  // Without surfaces it is what an older server reads.
+  ASSERT_TRUE(Save(shelf, kSecond, 1).ok());
+  EXPECT_EQ(Read(kSecond)[12], 1);
+  EXPECT_EQ(shelf.Load(kSecond)->surface, nullptr);
+}
+
 TEST_F(MapShelfTest, KeepsListsAndRemoves) {
   MapShelf shelf(folder_);
   EXPECT_TRUE(shelf.List().empty());

@@ -268,5 +268,44 @@ TEST(SurfaceOptions, NamesTheFieldAndWhatItMayBe) {
   EXPECT_THAT(std::string(map.status().message()), HasSubstr("surfaces.voxel_m=1: give 0.002 to"));
 }
 
+TEST(SurfaceMapRestored, IsShownUntilAsMuchIsSeenAgainAndGoesWithItsMap) {
+  SurfaceSnapshot before = MapOf(TheWalk())->Snapshot();
+  ASSERT_GT(before.chunks.size(), 3u);
+  // Something that is not there any more, where nobody looks.
+  SurfaceChunk elsewhere = *before.chunks.begin()->second;
+  elsewhere.index = {100, 100, 100};
+  before.chunks[elsewhere.index] = std::make_shared<const SurfaceChunk>(elsewhere);
+  before.generation = 1;
+
+  auto map = SurfaceMap::Create(Options());
+  ASSERT_TRUE(map.ok());
+  const std::uint64_t edition = (*map)->Snapshot().edition;
+  (*map)->Restore(before);
+  const SurfaceSnapshot restored = (*map)->Snapshot();
+  EXPECT_NE(restored.edition, edition);
+  EXPECT_EQ(restored.chunks.size(), before.chunks.size());
+  EXPECT_EQ(restored.voxel, before.voxel);
+
+  const Walk& walk = TheWalk();
+  for (std::size_t k = 0; k < walk.frames.size(); ++k) {
+    (*map)->Add(walk.frames[k], walk.Until(k));
+  }
+  while ((*map)->Work()) {
+  }
+  const SurfaceSnapshot again = (*map)->Snapshot();
+  EXPECT_GT(again.version, restored.version);
+  EXPECT_TRUE(again.chunks.contains(elsewhere.index));
+  int renewed = 0;
+  for (const auto& [index, chunk] : again.chunks) renewed += chunk->version > restored.version;
+  EXPECT_GT(renewed, 3);
+
+  KeyframePlaces other = walk.places;
+  other.generation = 2;
+  other.keyframes.clear();
+  (*map)->SetPlaces(other);
+  EXPECT_TRUE((*map)->Snapshot().chunks.empty());
+  EXPECT_NE((*map)->Snapshot().edition, again.edition);
+}
+
 }  // namespace
 }  // namespace saccade::surface_map_test
