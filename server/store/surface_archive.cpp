@@ -8,7 +8,7 @@
 namespace saccade {
 namespace {
 
-constexpr std::size_t kLeastChunk = 52;  // bytes of one, in a file
+constexpr std::size_t kLeastChunk = 54;  // bytes of one, in a file
 
 template <typename Archive, typename Triple>
 void Triples(Archive& archive, std::vector<Triple>& list) {
@@ -21,6 +21,7 @@ void Fields(Archive& archive, SurfaceChunk& chunk) {
   for (std::int32_t& at : chunk.index) archive.Number(at);
   for (int axis = 0; axis < 3; ++axis) archive.Number(chunk.origin_in_world[axis]);
   archive.Number(chunk.step_m);
+  archive.Number(chunk.span);
   Triples(archive, chunk.positions);
   Triples(archive, chunk.colors_rgb);
   Triples(archive, chunk.triangles);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kNetSide = kChunkBlocks * VoxelMap::kSide;  // voxels of a chunk
 constexpr int kNetGrid = kNetSide + 2;                    // from -1 to kNetSide
-constexpr float kNetVoxel = 1'760.0f;                     // steps: kNetGrid voxels fit into 16 bits
+constexpr float kNetVoxel = 64.0f;                        // steps: a quarter of a millimetre
 constexpr int kSmallPiece = 24;                           // triangles
 constexpr int kNobody = -1;
 
@@ -226,6 +226,7 @@ SurfaceChunk ExtractChunk(const VoxelMap& voxels, const SurfaceChunk::Index& ind
                                   static_cast<float>(index[2])) -
        Eigen::Vector3f::Ones());
   chunk.step_m = voxels.voxel() / kNetVoxel;
+  chunk.span = static_cast<std::uint16_t>(kNetGrid * kNetVoxel);
   const Grid grid(voxels, index);
   if (grid.empty()) return chunk;
   Net net(grid, std::max(1, static_cast<int>(std::lround(least_weight * VoxelMap::kUnitWeight))),

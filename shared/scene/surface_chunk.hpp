@@ -19,6 +19,7 @@ struct SurfaceChunk {
   std::uint64_t version = 0;  // rises with every change of any chunk
   Eigen::Vector3f origin_in_world = Eigen::Vector3f::Zero();  // [m]
   float step_m = 0.0f;
+  std::uint16_t span = 65'535;  // steps along each side of its cube: no position is beyond
   std::vector<std::array<std::uint16_t, 3>> positions;
   std::vector<std::array<std::uint8_t, 3>> colors_rgb;  // of each position
   std::vector<Triangle> triangles;  // of positions; none: nothing is known there

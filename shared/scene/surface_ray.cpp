@@ -8,15 +8,13 @@
 namespace saccade {
 namespace {
 
-constexpr float kStepsAcross = 65'535.0f;  // positions are 16 bits
-
 /// Where the ray is inside the chunk's cube; nothing: it passes by.
 std::optional<std::pair<float, float>> Inside(const SurfaceChunk& chunk,
                                               const Eigen::Vector3f& origin,
                                               const Eigen::Vector3f& inverse_ray) {
   const Eigen::Array3f low = (chunk.origin_in_world - origin).array() * inverse_ray.array();
   const Eigen::Array3f high = (chunk.origin_in_world - origin).array() * inverse_ray.array() +
-                              kStepsAcross * chunk.step_m * inverse_ray.array();
+                              chunk.span * chunk.step_m * inverse_ray.array();
   const float enters = low.min(high).maxCoeff();
   const float leaves = low.max(high).minCoeff();
   if (!(leaves >= enters) || leaves < 0.0f) return std::nullopt;

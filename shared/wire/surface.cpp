@@ -106,7 +106,9 @@ absl::StatusOr<SurfaceChunk> FromProto(const v1::SurfaceChunk& message) {
                   [&](std::uint32_t corner) { return corner >= corners.size(); })) {
     return BadChunk("triangles", "a corner that is not there");
   }
+  chunk.span = 0;
   for (const CodedCorner& corner : corners) {
+    for (const std::uint16_t at : corner.place) chunk.span = std::max(chunk.span, at);
     chunk.positions.push_back({corner.place[0], corner.place[1], corner.place[2]});
     chunk.colors_rgb.push_back({corner.color_rgb[0], corner.color_rgb[1], corner.color_rgb[2]});
   }
