@@ -130,6 +130,8 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
     line["things"] = {{"said", state.things.said},
                       {"busy", state.things.busy},
                       {"selected", state.things.selected_id},
+                      {"total", state.things.registering.Total()},
+                      {"pairs", state.things.registering.pairs().size()},
                       {"count", told.scene.scene().objects.size()},
                       {"buttons", std::move(buttons)}};
   }

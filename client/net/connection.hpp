@@ -119,6 +119,10 @@ class Connection {
   /// Lets it go where `object` says, after a push if there is one, lowered until it rests.
   absl::StatusOr<PlacedThing> PlaceThing(const SceneObject& object,
                                          const std::optional<Eigen::Vector3d>& push);
+  /// Where it lies by these pairs, four at least; it is moved there only with `accept`.
+  absl::StatusOr<RegisteredThing> RegisterThing(const std::string& id,
+                                                const std::vector<PointPair>& pairs,
+                                                bool with_scale, bool accept);
   /// What was undone or redone, in words. Acts on the person's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();
