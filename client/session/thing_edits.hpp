@@ -27,7 +27,7 @@ class ThingEdits {
   /// Lets it go where `draft` says, after a push along the floor if there is one; it is added where
   /// it has no id.
   void Place(const SceneObject& draft, const std::optional<Eigen::Vector3d>& push, Done done);
-  /// Sends the GLB `file` if no model of the server has its name, and places it as `draft` says.
+  /// Sends the GLB `file`, the same one being the same model, and places it as `draft` says.
   void PlaceModel(const std::string& name, const std::string& file, SceneObject draft, Done done);
   /// Adds a thing (no id), or changes the one of its id; nothing stops it. `said` puts what came of
   /// it in words. `further`: part of the change before it, with which it is taken back.

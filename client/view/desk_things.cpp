@@ -86,14 +86,15 @@ void Desk::PlaceThing(const std::string& model, const Rigid3& start) {
   draft.shape = SceneShape::kModel;
   draft.material = SceneMaterial::kVirtual;
   draft.parent_from_object = start;
+  // The library's first: an overlay's model may have the same name.
+  const std::string glb = LibraryFile(model);
+  if (!glb.empty()) return thing_edits_.PlaceModel(model, glb, draft, thing_work_.Tell());
   for (const auto& known : scene.models) {
     if (known->name != model) continue;
     draft.model = known->id;
     return thing_edits_.Place(draft, std::nullopt, thing_work_.Tell());
   }
-  const std::string glb = LibraryFile(model);
-  if (glb.empty()) return thing_work_.Refuse("", "that model is not there, or cannot be read");
-  thing_edits_.PlaceModel(model, glb, draft, thing_work_.Tell());
+  thing_work_.Refuse("", "that model is not there, or cannot be read");
 }
 
 const SceneObject* Desk::Movable(const char* what) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 
@@ -26,6 +27,7 @@ struct ThingDesk {
   std::string selected_id;                           // empty: none
   std::string said;
   bool warn = false;
+  std::uint32_t tells = 0;              // how often something was said
   bool busy = false;                    // the server is asked; what comes meanwhile is passed over
   std::map<std::string, Rect> buttons;  // where the panel's are now, by their words; for tests
 };

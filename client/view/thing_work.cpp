@@ -39,6 +39,7 @@ std::string SizeWords(const SceneObject& thing) {
 void ThingWork::Say(const std::string& words, bool warn) {
   things().said = words;
   things().warn = warn;
+  ++things().tells;
 }
 
 void ThingWork::Refuse(const Where& where, const std::string& why) {
@@ -174,7 +175,7 @@ void ThingWork::ShowInside(const Where& where, const ThingSpot& spot, const std:
   double& y = draft.parent_from_object.translation.y();
   things().click = Click::kSelect;
   for (const auto& known : scene().models) {
-    if (known->name != model) continue;
+    if (!file.empty() || known->name != model) continue;
     draft.model = known->id;
     y += HeightOf(known->mesh) / 2;
     return edits_.Put(draft, IsThere, Tell(where));

@@ -160,6 +160,7 @@ void DrawGroup(const char* words) {
 
 void DrawChoice(Desk& desk) {
   const ThingDesk& things = desk.state().things;
+  ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted("A click");
   ImGui::SameLine();
   ImGui::SetNextItemWidth(-1);
@@ -235,7 +236,8 @@ void DrawRows(const PanelContext& context) {
 
 void DrawThings(const PanelContext& context, const Rect& rect) {
   Desk& desk = context.desk;
-  const ThingDesk& things = desk.state().things;
+  ThingDesk& things = desk.state().things;
+  things.buttons.clear();
   BeginPanel("things", rect, Colours().panel, true);
   ImGui::PushFont(context.fonts.bold);
   ImGui::TextUnformatted("Things");

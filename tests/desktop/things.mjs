@@ -34,11 +34,23 @@ const shelf = ({ ask }) => ask('scene', 'list').objects.find(({ name }) => name 
 export const mm = (m) => `${(1000 * m).toFixed(2)} mm`;
 const turnDeg = ({ rotation_xyzw: [, y, , w] }) => (2 * Math.atan2(y, w) * 180) / Math.PI;
 
-/** Presses a button of the panel, as its words are. */
-export async function pressButton({ desktop, screen }, words) {
-  const shown = await desktop.until(words, ({ things }) => things?.buttons[words], 10_000);
+/** Presses a button of the panel, as its words are, once it stands still. */
+export async function pressButton(context, words) {
+  const { desktop, screen } = context;
+  let before;
+  const shown = await desktop.until(
+    words,
+    ({ seq, things }) => {
+      const rect = things?.buttons[words];
+      const still = before && rect && before.seq !== seq && String(before.rect) === String(rect);
+      if (before?.seq !== seq) before = { seq, rect };
+      return still;
+    },
+    10_000,
+  );
+  context.tells = shown.things.tells;
   screen.click(middle(shown.things.buttons[words]));
-  await sleep(400);
+  await sleep(300);
 }
 
 /** Where a point of the world is in the window, in the map. */
@@ -54,10 +66,10 @@ export function inMap({ desktop }, point) {
 }
 
 /** What the panel says once it has heard from the server. */
-export async function says({ desktop }, pattern) {
+export async function says({ desktop, tells }, pattern) {
   const { things } = await desktop.until(
     String(pattern),
-    (shown) => !shown.things.busy && pattern.test(shown.things.said),
+    (shown) => !shown.things.busy && shown.things.tells > tells && pattern.test(shown.things.said),
     15_000,
   );
   return things.said;

@@ -21,8 +21,8 @@ async function choose(context, words) {
 
 /** Features that a click in the map means, far from each other on the screen. */
 function features(context, count, wanted = () => true) {
-  const [left, top, width, height] = context.desktop.look().map.pane;
-  const [insetX, insetY] = context.desktop.look().inset;
+  const [paneX, paneY, width, height] = context.desktop.look().map.pane;
+  const [insetX, insetY, insetWidth] = context.desktop.look().inset;
   const seen = context
     .map()
     .features.filter(({ depth_known }) => depth_known)
@@ -30,8 +30,8 @@ function features(context, count, wanted = () => true) {
     .filter(({ at }) => at);
   const away = (a, b) => length(minus(a.at, b.at));
   const inside = ([x, y]) =>
-    x > left + 20 && y > top + 20 && x < left + width - 20 && y < top + height - 20;
-  const covered = ([x, y]) => x > insetX - 20 && y > insetY - 20;
+    x > paneX + 20 && y > paneY + 20 && x < paneX + width - 20 && y < paneY + height - 20;
+  const covered = ([x, y]) => x < insetX + insetWidth + 20 && y > insetY - 20;
   const free = seen.filter(
     (one) =>
       inside(one.at) &&
@@ -39,10 +39,11 @@ function features(context, count, wanted = () => true) {
       seen.every((other) => other === one || away(one, other) > ALONE_PX),
   );
   const chosen = [];
-  for (const one of free) {
-    if (chosen.length === count) break;
-    if (chosen.every((other) => away(one, other) > APART_PX) && wanted(one, chosen))
-      chosen.push(one);
+  const gap = (one) => Math.min(...chosen.map((other) => away(one, other)), 1e4);
+  while (chosen.length < count) {
+    const left = free.filter((one) => gap(one) > APART_PX && wanted(one, chosen));
+    if (left.length === 0) break;
+    chosen.push(left.reduce((best, one) => (gap(one) > gap(best) ? one : best)));
   }
   if (chosen.length < count) throw new Error(`${chosen.length} of ${count} features are free`);
   return chosen;
@@ -50,6 +51,7 @@ function features(context, count, wanted = () => true) {
 
 /** Where a feature is now: the map goes on. */
 const clickPoint = async (context, point) => {
+  context.tells = context.desktop.look().things.tells;
   context.screen.click(inMap(context, point));
   await sleep(400);
 };
@@ -133,9 +135,9 @@ export async function registered(context) {
   const file = join(folder, 'four.glb');
   writeFileSync(file, glbOf(points));
   ask('scene', 'add', '--model', file, '--name', 'four', '--at', OFF_M.join(','));
-  await desktop.until('the model is listed', ({ things }) => things.buttons['four · virtual']);
+  await desktop.until('the model is listed', ({ things }) => things.buttons['four · real']);
   await sleep(500); // it is drawn
-  await pressButton(context, 'four · virtual');
+  await pressButton(context, 'four · real');
   await choose(context, 'registers the selected: 4 points');
   for (const [i, point] of points.entries()) {
     await clickPoint(
@@ -148,7 +150,7 @@ export async function registered(context) {
   }
   const told = await desktop.until(
     'its error',
-    ({ things }) => /^error/.test(things.total),
+    ({ things }) => !/asking|more/.test(things.total),
     15_000,
   );
   const before = length(minus(named(context, 'four').position_m, OFF_M));
