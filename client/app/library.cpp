@@ -5,8 +5,6 @@
 namespace saccade::app {
 namespace {
 
-constexpr const char* kShownInside = "inside";  // of a cabinet: stands on no floor
-
 std::filesystem::path ModelFolder() {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -23,7 +21,7 @@ std::map<std::string, std::filesystem::path> LibraryModels() {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(ModelFolder(), error)) {
     const std::filesystem::path& file = entry.path();
-    if (file.extension() == ".glb" && file.stem() != kShownInside) models[file.stem()] = file;
+    if (file.extension() == ".glb") models[file.stem()] = file;
   }
   return models;
 }

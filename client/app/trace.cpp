@@ -128,8 +128,11 @@ void Trace::Shown(const view::Desk& desk, const view::DeskView& view, const view
     json buttons = json::object();
     for (const auto& [words, rect] : state.things.buttons) buttons[words] = RectOf(rect);
     line["things"] = {{"said", state.things.said},
+                      {"tells", state.things.tells},
                       {"busy", state.things.busy},
                       {"selected", state.things.selected_id},
+                      {"total", state.things.registering.Total()},
+                      {"pairs", state.things.registering.pairs().size()},
                       {"count", told.scene.scene().objects.size()},
                       {"buttons", std::move(buttons)}};
   }

@@ -40,6 +40,13 @@ Eigen::Vector3d Vector(const std::string& text) {
 
 nlohmann::json SceneJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
+/// What it moves with; null: no marker.
+nlohmann::json MarkerJson(const SceneObject& object) {
+  if (object.parent != SceneParent::kMarker) return nullptr;
+  return {
+      {"family", object.marker_family}, {"id", object.marker_id}, {"side_m", object.marker_side_m}};
+}
+
 nlohmann::json SceneJson(const SceneObject& object) {
   const Eigen::Quaterniond& q = object.parent_from_object.rotation;
   return {{"id", object.id},
@@ -50,6 +57,7 @@ nlohmann::json SceneJson(const SceneObject& object) {
           {"size_m", SceneJson(object.size_m)},
           {"scale", object.scale},
           {"annotation_id", object.annotation_id},
+          {"marker", MarkerJson(object)},
           {"position_m", SceneJson(object.parent_from_object.translation)},
           {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
@@ -222,11 +230,10 @@ absl::Status RunRemove(const Options& options, net::SceneClient& client) {
 }
 
 /// Lines of six numbers: a point in the object, the same in the world.
-absl::StatusOr<std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>> ReadPoints(
-    const std::string& file) {
+absl::StatusOr<std::vector<net::PointPair>> ReadPoints(const std::string& file) {
   const absl::StatusOr<std::string> text = ReadRegularFile(file, kMostPointsBytes, "points (CSV)");
   if (!text.ok()) return text.status();
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> points;
+  std::vector<net::PointPair> points;
   std::istringstream lines(*text);
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {

@@ -70,6 +70,8 @@ absl::Status Explain(const ConnectionOptions& options, const grpc::Status& statu
       return absl::Status(code,
                           absl::StrCat("the server at ", options.server, " does not offer this (",
                                        status.error_message(), "); is it another version?"));
+    case grpc::StatusCode::CANCELLED:  // gRPC's own word for it is no sentence
+      return absl::Status(code, "the server ended the connection");
     default:
       return absl::Status(code, status.error_message());
   }

@@ -123,6 +123,10 @@ class Connection {
   /// What is newer than `version` of the place's surfaces; `max_bytes`: 4 096 to 524 288.
   absl::StatusOr<SurfacePiece> GetSurface(std::uint64_t edition, std::uint64_t version,
                                           std::uint32_t max_bytes);
+  /// Where it lies by these pairs, four at least; it is moved there only with `accept`.
+  absl::StatusOr<RegisteredThing> RegisterThing(const std::string& id,
+                                                const std::vector<PointPair>& pairs,
+                                                bool with_scale, bool accept);
   /// What was undone or redone, in words. Acts on the person's own last change.
   absl::StatusOr<std::string> Undo();
   absl::StatusOr<std::string> Redo();

@@ -59,4 +59,13 @@ absl::StatusOr<PlacedThing> Connection::PlaceThing(const SceneObject& object,
   return FromProto(*answer);
 }
 
+absl::StatusOr<RegisteredThing> Connection::RegisterThing(const std::string& id,
+                                                          const std::vector<PointPair>& pairs,
+                                                          bool with_scale, bool accept) {
+  const auto answer = impl_->CallInSession(*impl_->scene_, &v1::SceneService::Stub::RegisterObject,
+                                           RegisterRequest(id, pairs, with_scale, accept));
+  if (!answer.ok()) return answer.status();
+  return FromProto(*answer);
+}
+
 }  // namespace saccade::net

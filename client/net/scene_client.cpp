@@ -123,29 +123,13 @@ absl::StatusOr<ModelFacts> SceneClient::Upload(const std::string& name, const st
       progress);
 }
 
-absl::StatusOr<RegisteredThing> SceneClient::Register(
-    const std::string& id,
-    const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& object_and_world,
-    bool with_scale, bool accept) {
-  v1::RegisterSceneObjectRequest request;
-  request.set_id(id);
-  request.set_with_scale(with_scale);
-  request.set_accept(accept);
-  for (const auto& [in_object, in_world] : object_and_world) {
-    v1::SceneCorrespondence* one = request.add_correspondences();
-    *one->mutable_point_in_object_m() = wire::ToProto(in_object);
-    *one->mutable_point_in_world_m() = wire::ToProto(in_world);
-  }
-  const auto answer = impl_->Ask(&v1::SceneService::Stub::RegisterObject, request);
+absl::StatusOr<RegisteredThing> SceneClient::Register(const std::string& id,
+                                                      const std::vector<PointPair>& pairs,
+                                                      bool with_scale, bool accept) {
+  const auto answer = impl_->Ask(&v1::SceneService::Stub::RegisterObject,
+                                 RegisterRequest(id, pairs, with_scale, accept));
   if (!answer.ok()) return answer.status();
-  absl::StatusOr<SceneObject> object = wire::FromProto(answer->object(), "object");
-  if (!object.ok()) return object.status();
-  return RegisteredThing{
-      *std::move(object),
-      answer->rms_mm(),
-      answer->left_out_rms_mm(),
-      {answer->errors_mm().begin(), answer->errors_mm().end()},
-      {answer->left_out_errors_mm().begin(), answer->left_out_errors_mm().end()}};
+  return FromProto(*answer);
 }
 
 }  // namespace saccade::net

@@ -22,11 +22,6 @@ struct SceneList {
   std::vector<SceneObject> objects;
   std::vector<ModelFacts> models;
 };
-struct RegisteredThing {
-  SceneObject object;
-  double rms_mm = 0, left_out_rms_mm = 0;
-  std::vector<double> errors_mm, left_out_errors_mm;
-};
 
 /// The scene of one server. Calls block, errors as of Connection.
 class SceneClient {
@@ -47,10 +42,9 @@ class SceneClient {
   /// In pieces; `progress` is told the bytes that are there.
   absl::StatusOr<ModelFacts> Upload(const std::string& name, const std::string& glb,
                                     const std::function<void(std::size_t)>& progress);
-  absl::StatusOr<RegisteredThing> Register(
-      const std::string& id,
-      const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& object_and_world,
-      bool with_scale, bool accept);
+  absl::StatusOr<RegisteredThing> Register(const std::string& id,
+                                           const std::vector<PointPair>& pairs, bool with_scale,
+                                           bool accept);
 
  private:
   class Impl;

@@ -63,6 +63,17 @@ absl::StatusOr<PlacedThing> FromProto(const v1::PlaceSceneObjectResponse& messag
   return placed;
 }
 
+absl::StatusOr<RegisteredThing> FromProto(const v1::RegisterSceneObjectResponse& message) {
+  absl::StatusOr<SceneObject> object = wire::FromProto(message.object(), "object");
+  if (!object.ok()) return object.status();
+  return RegisteredThing{
+      *std::move(object),
+      message.rms_mm(),
+      message.left_out_rms_mm(),
+      {message.errors_mm().begin(), message.errors_mm().end()},
+      {message.left_out_errors_mm().begin(), message.left_out_errors_mm().end()}};
+}
+
 v1::PlaceSceneObjectRequest PlaceRequest(const SceneObject& object,
                                          const std::optional<Eigen::Vector3d>& push,
                                          const std::optional<Eigen::Vector3d>& gravity) {
@@ -70,6 +81,21 @@ v1::PlaceSceneObjectRequest PlaceRequest(const SceneObject& object,
   *request.mutable_object() = wire::ToProto(object);
   if (push) *request.mutable_push_in_world() = wire::ToProto(*push);
   if (gravity) *request.mutable_gravity_in_world() = wire::ToProto(*gravity);
+  return request;
+}
+
+v1::RegisterSceneObjectRequest RegisterRequest(const std::string& id,
+                                               const std::vector<PointPair>& pairs, bool with_scale,
+                                               bool accept) {
+  v1::RegisterSceneObjectRequest request;
+  request.set_id(id);
+  request.set_with_scale(with_scale);
+  request.set_accept(accept);
+  for (const PointPair& pair : pairs) {
+    v1::SceneCorrespondence* one = request.add_correspondences();
+    *one->mutable_point_in_object_m() = wire::ToProto(pair.in_object);
+    *one->mutable_point_in_world_m() = wire::ToProto(pair.in_world);
+  }
   return request;
 }
 

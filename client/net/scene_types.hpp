@@ -29,6 +29,18 @@ struct PlacedThing {
   Touch support;
 };
 
+/// A point of an object, in its own frame (of a model before its scale), and the same in the map
+/// [m].
+struct PointPair {
+  Eigen::Vector3d in_object, in_world;
+};
+/// Where an object lies by such pairs, and how far off each is: by all, and by the others alone.
+struct RegisteredThing {
+  SceneObject object;
+  double rms_mm = 0, left_out_rms_mm = 0;
+  std::vector<double> errors_mm, left_out_errors_mm;
+};
+
 /// What changed in the scene.
 struct SceneChange {
   std::uint64_t revision = 0;

@@ -37,6 +37,12 @@ void ThingEdits::Renumber(const std::string& old, const std::string& id) {
   }
 }
 
+std::optional<SceneObject> ThingEdits::Known(const std::string& id) const {
+  const SceneObject* known = session_.state().scene.scene().Find(id);
+  if (known == nullptr) return std::nullopt;
+  return *known;
+}
+
 void ThingEdits::Placed(const absl::StatusOr<net::PlacedThing>& placed,
                         const std::optional<SceneObject>& was, const Done& done) {
   if (!placed.ok()) return done(placed.status());
@@ -46,9 +52,7 @@ void ThingEdits::Placed(const absl::StatusOr<net::PlacedThing>& placed,
 
 void ThingEdits::Place(const SceneObject& draft, const std::optional<Eigen::Vector3d>& push,
                        Done done) {
-  const SceneObject* known = session_.state().scene.scene().Find(draft.id);
-  std::optional<SceneObject> was;
-  if (known != nullptr) was = *known;
+  const std::optional<SceneObject> was = Known(draft.id);
   Ask(
       [this, draft, push, was, done](net::Connection& connection) -> Session::Answer {
         return [this, placed = connection.PlaceThing(draft, push), was, done](State& /*state*/) {
@@ -70,6 +74,71 @@ void ThingEdits::PlaceModel(const std::string& name, const std::string& file, Sc
         draft.model = model->id;
         return [this, placed = connection.PlaceThing(draft, std::nullopt), done](State& /*state*/) {
           Placed(placed, std::nullopt, done);
+        };
+      },
+      done);
+}
+
+void ThingEdits::TellPut(const absl::StatusOr<SceneObject>& put,
+                         const std::optional<SceneObject>& was, const Said& said,
+                         const Done& done) {
+  if (!put.ok()) return done(put.status());
+  Remember(was ? Step{was, ""} : Step{std::nullopt, put->id});
+  done(Told{put->id, said(*put)});
+}
+
+void ThingEdits::Put(const SceneObject& draft, Said said, Done done, bool further) {
+  Ask(
+      [this, draft, was = Known(draft.id), said = std::move(said), done,
+       further](net::Connection& connection) -> Session::Answer {
+        return
+            [this, put = connection.PutThing(draft), was, said, done, further](State& /*state*/) {
+              if (!put.ok() || !further) return TellPut(put, was, said, done);
+              done(Told{put->id, said(*put)});
+            };
+      },
+      done);
+}
+
+void ThingEdits::PutModel(const std::string& name, const std::string& file, SceneObject draft,
+                          Said said, Done done) {
+  Ask(
+      [this, name, file, draft = std::move(draft), said = std::move(said),
+       done](net::Connection& connection) mutable -> Session::Answer {
+        const absl::StatusOr<net::ModelFacts> model = connection.UploadModel(name, file);
+        if (!model.ok()) {
+          return [status = model.status(), done](State& /*state*/) { done(status); };
+        }
+        draft.model = model->id;
+        return [this, put = connection.PutThing(draft), said, done](State& /*state*/) {
+          TellPut(put, std::nullopt, said, done);
+        };
+      },
+      done);
+}
+
+void ThingEdits::TryRegister(
+    const std::string& id, const std::vector<net::PointPair>& pairs, bool with_scale,
+    std::function<void(const absl::StatusOr<net::RegisteredThing>&)> done) {
+  Ask(
+      [id, pairs, with_scale, done](net::Connection& connection) -> Session::Answer {
+        return [found = connection.RegisterThing(id, pairs, with_scale, false),
+                done](State& /*state*/) { done(found); };
+      },
+      [done](const absl::StatusOr<Told>& refused) { done(refused.status()); });
+}
+
+void ThingEdits::Register(const std::string& id, const std::vector<net::PointPair>& pairs,
+                          bool with_scale, Done done) {
+  Ask(
+      [this, id, pairs, with_scale, was = Known(id),
+       done](net::Connection& connection) -> Session::Answer {
+        return [this, found = connection.RegisterThing(id, pairs, with_scale, true), was,
+                done](State& /*state*/) {
+          if (!found.ok()) return done(found.status());
+          if (was) Remember({was, ""});
+          done(Told{found->object.id,
+                    absl::StrFormat("%s registered: %.1f mm", found->object.name, found->rms_mm)});
         };
       },
       done);

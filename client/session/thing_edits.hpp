@@ -27,8 +27,21 @@ class ThingEdits {
   /// Lets it go where `draft` says, after a push along the floor if there is one; it is added where
   /// it has no id.
   void Place(const SceneObject& draft, const std::optional<Eigen::Vector3d>& push, Done done);
-  /// Sends the GLB `file` if no model of the server has its name, and places it as `draft` says.
+  /// Sends the GLB `file`, the same one being the same model, and places it as `draft` says.
   void PlaceModel(const std::string& name, const std::string& file, SceneObject draft, Done done);
+  /// Adds a thing (no id), or changes the one of its id; nothing stops it. `said` puts what came of
+  /// it in words. `further`: part of the change before it, with which it is taken back.
+  using Said = std::function<std::string(const SceneObject&)>;
+  void Put(const SceneObject& draft, Said said, Done done, bool further = false);
+  /// As PlaceModel, but put where `draft` says.
+  void PutModel(const std::string& name, const std::string& file, SceneObject draft, Said said,
+                Done done);
+  /// Where a thing lies by pairs of points; nothing is moved.
+  void TryRegister(const std::string& id, const std::vector<net::PointPair>& pairs, bool with_scale,
+                   std::function<void(const absl::StatusOr<net::RegisteredThing>&)> done);
+  /// The same, and it is moved there.
+  void Register(const std::string& id, const std::vector<net::PointPair>& pairs, bool with_scale,
+                Done done);
   void Remove(const std::string& id, Done done);
   /// Takes back the last change made here.
   void Undo(Done done);
@@ -44,6 +57,9 @@ class ThingEdits {
   void Placed(const absl::StatusOr<net::PlacedThing>& placed, const std::optional<SceneObject>& was,
               const Done& done);
   void Ask(Session::Request request, const Done& done);
+  std::optional<SceneObject> Known(const std::string& id) const;
+  void TellPut(const absl::StatusOr<SceneObject>& put, const std::optional<SceneObject>& was,
+               const Said& said, const Done& done);
 
   Session& session_;
   std::vector<Step> steps_;

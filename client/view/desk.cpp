@@ -50,6 +50,7 @@ Desk::News Desk::Poll(Timestamp now_ns) {
   if (!laser_id_.empty() && now_ns - pointed_ns_ > kSayAgainNs) PointAt(pointed_at_, false);
   TellSketches(now_ns);
   SendTurns(now_ns);
+  thing_work_.Check(now_ns, markers());
   changed = CheckLoading() || changed;
   changed = state_.Expire(now_ns) || changed;
   changed = session().Expire(now_ns) || changed;
@@ -165,6 +166,7 @@ void Desk::Escape() {
     dragged_to_.reset();
   } else if (state_.confirming_reset) {
     state_.confirming_reset = false;
+  } else if (thing_work_.Cancel()) {
   } else if (state_.tool != tools::Action::kSelect) {
     state_.tool = tools::Action::kSelect;
   } else if (state_.still) {
@@ -181,6 +183,7 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
   if (control.group == tools::Group::kTool) {
     const std::string why = action == kGaze ? WhyNoHead() : "";
     if (!why.empty()) return state_.Refuse(control.label, why, now_ns);
+    if (action != kThings) thing_work_.Cancel();
     state_.tool = action;
     state_.measure_from.reset();
     return;

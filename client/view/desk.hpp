@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@
 #include "client/tools/view.hpp"
 #include "client/view/desk_state.hpp"
 #include "client/view/layout.hpp"
+#include "client/view/thing_work.hpp"
 
 namespace saccade::view {
 
@@ -146,7 +148,10 @@ class Desk {
   std::map<std::string, std::filesystem::path> library;
   /// What a click does with things; `model`: of the library or the server, where it places one.
   void ChooseThingClick(ThingDesk::Click click, const std::string& model = "");
-  void SelectThing(const std::string& id) { state_.things.selected_id = id; }
+  void SelectThing(const std::string& id);
+  ThingWork& thing_work() { return thing_work_; }
+  /// Those that move, of the picture shown.
+  std::span<const MarkerPose> markers() const;
   /// The selected thing along the floor as the main pane sees it, until it touches.
   void PushThing(tools::Way way);
   /// By a step about the vertical.
@@ -191,16 +196,15 @@ class Desk {
             std::function<void(const absl::StatusOr<PicturePtr>&)> done);
   bool CheckLoading();
   void LoadForDialog();
-  void UseThings(Pane pane, const std::optional<tools::Landing>& landing,
-                 const std::optional<RayTarget>& ray);
+  void UseThings(Pane pane, const std::optional<ThingSpot>& spot);
   /// Where a thing would stand: on a known surface, else where the map says.
   std::optional<Eigen::Vector3d> ThingPlace(const std::optional<tools::Landing>& landing,
                                             const RayTarget& ray) const;
   void PlaceThing(const std::string& model, const Rigid3& start);
+  /// A model's GLB file; empty: the library has none of that name.
+  std::string LibraryFile(const std::string& model) const;
   /// The selected thing, if it is one that can be moved; else says why `what` was not done.
   const SceneObject* Movable(const char* what);
-  void SayOfThings(const std::string& words, bool warn = false);
-  session::ThingEdits::Done TellOfThings();
   static AnnotationDraft PictureDraft(const PicturePtr& picture, const std::string& text);
   void Freeze(Timestamp now_ns);
   void Snapshot(Timestamp now_ns);
@@ -225,6 +229,7 @@ class Desk {
   session::Session session_;  // after player_ and voice_: it pushes there
   session::Edits edits_{session_};
   session::ThingEdits thing_edits_{session_};
+  ThingWork thing_work_{session_, thing_edits_, state_};
   session::GazePilot pilot_{session_};
   session::LatencyMeter latency_;
   session::RateMeter rate_;
@@ -242,7 +247,7 @@ class Desk {
   struct Pressed {
     std::optional<tools::Landing> landing;
     std::string picked_id;
-    std::optional<RayTarget> ray;
+    std::optional<ThingSpot> spot;
   };
   std::optional<Pressed> pressed_;
   std::optional<PixelTarget> pressed_pixel_;

@@ -64,8 +64,10 @@ void Desk::HoverAt(Pane pane, const std::optional<Eigen::Vector2d>& pixel, const
 
 void Desk::Press(Pane pane, const Eigen::Vector2d& pixel, const tools::View* view, double pick_px,
                  const Held& held) {
-  pressed_ = Pressed{LandingAt(pane, pixel, view), "",
-                     view != nullptr ? tools::RayThrough(*view, pixel) : std::nullopt};
+  pressed_ = Pressed{LandingAt(pane, pixel, view), "", std::nullopt};
+  if (const auto ray = view != nullptr ? tools::RayThrough(*view, pixel) : std::nullopt) {
+    pressed_->spot = ThingSpot{*view, pixel, *ray, pressed_->landing, pick_px};
+  }
   const decode::Picture* picture = shown();
   if (pane == Pane::kVideo && picture != nullptr) {
     pressed_pixel_ = PixelTarget{picture->facts->frame_id, pixel};
@@ -179,7 +181,7 @@ void Desk::Release(Pane pane, const Eigen::Vector2d& pixel, const tools::View* v
   const auto refuse = [&](const char* what) {
     state_.Refuse(where, absl::StrCat(what, WhyNoLanding(pane)), now_ns);
   };
-  if (state_.tool == tools::Action::kThings) return UseThings(pane, pressed.landing, pressed.ray);
+  if (state_.tool == tools::Action::kThings) return UseThings(pane, pressed.spot);
   if (state_.tool == tools::Action::kGaze) {
     if (!pressed.picked_id.empty()) return LookAtMark(pressed.picked_id, where, now_ns);
     if (!pressed.landing) return refuse("Not turned: ");

@@ -12,6 +12,7 @@
 #include "client/tools/marks.hpp"
 #include "client/tools/selection.hpp"
 #include "client/view/layout.hpp"
+#include "client/view/thing_desk.hpp"
 
 namespace saccade::view {
 
@@ -84,18 +85,6 @@ struct TalkField {
   bool finish = false;   // Enter was pressed; what was typed before it may still be on its way
   std::string text;
   std::string problem;
-};
-
-/// Things of the scene: what a click does with them, and what came of the last one.
-struct ThingDesk {
-  enum class Click { kSelect, kMove, kPlace };
-  Click click = Click::kSelect;
-  std::string model;        // kPlace: the name of a model of the server or of the library
-  std::string selected_id;  // empty: none
-  std::string said;
-  bool warn = false;
-  bool busy = false;                    // the server is asked; what comes meanwhile is passed over
-  std::map<std::string, Rect> buttons;  // where the panel's are now, by their words; for tests
 };
 
 /// What this person is doing with one wearer. The thread that draws.

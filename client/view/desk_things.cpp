@@ -17,34 +17,20 @@ constexpr double kThingTurn_rad = std::numbers::pi / 12;
 
 }  // namespace
 
-void Desk::SayOfThings(const std::string& words, bool warn) {
-  state_.things.said = words;
-  state_.things.warn = warn;
-}
-
-session::ThingEdits::Done Desk::TellOfThings() {
-  state_.things.busy = true;
-  return [this](const absl::StatusOr<session::ThingEdits::Told>& told) {
-    state_.things.busy = false;
-    if (!told.ok()) {
-      return SayOfThings(absl::StrCat("Not done: ", told.status().message()), true);
-    }
-    state_.things.selected_id = told->id;
-    SayOfThings(told->words);
-  };
-}
-
 void Desk::ChooseThingClick(ThingDesk::Click click, const std::string& model) {
   state_.things.click = click;
   state_.things.model = model;
-  switch (click) {
-    case ThingDesk::Click::kSelect:
-      return SayOfThings("Click a thing to select it.");
-    case ThingDesk::Click::kMove:
-      return SayOfThings("Click where the selected thing is to stand.");
-    case ThingDesk::Click::kPlace:
-      return SayOfThings(absl::StrCat("Click where the ", model, " is to stand."));
-  }
+  thing_work_.Begin();
+}
+
+void Desk::SelectThing(const std::string& id) {
+  state_.things.selected_id = id;
+  if (state_.things.click == ThingDesk::Click::kRegister) thing_work_.Begin();
+}
+
+std::span<const MarkerPose> Desk::markers() const {
+  if (!live_ || picture_paused()) return {};
+  return live_->facts->markers;
 }
 
 std::optional<Eigen::Vector3d> Desk::ThingPlace(const std::optional<tools::Landing>& landing,
@@ -54,33 +40,43 @@ std::optional<Eigen::Vector3d> Desk::ThingPlace(const std::optional<tools::Landi
   return std::nullopt;
 }
 
-void Desk::UseThings(Pane pane, const std::optional<tools::Landing>& landing,
-                     const std::optional<RayTarget>& ray) {
+void Desk::UseThings(Pane pane, const std::optional<ThingSpot>& spot) {
+  using Click = ThingDesk::Click;
   ThingDesk& things = state_.things;
-  const auto refuse = [&](const std::string& why) {
-    SayOfThings(absl::StrCat("Not done: ", why), true);
-    state_.Refuse(NameOf(pane), things.said, MonotonicNow());
-  };
-  if (!ray) return refuse(WhyNoLanding(pane));
-  if (things.click == ThingDesk::Click::kSelect) {
-    const SceneObject* picked = tools::PickThing(session().scene.scene(), *ray);
+  const Where where = NameOf(pane);
+  if (!spot) return thing_work_.Refuse(where, WhyNoLanding(pane));
+  if (things.click == Click::kSelect) {
+    const SceneObject* picked = tools::PickThing(session().scene.scene(), spot->ray);
     things.selected_id = picked != nullptr ? picked->id : "";
-    return SayOfThings(picked != nullptr ? "" : "No thing is there.");
+    return thing_work_.Say(picked != nullptr ? "" : "No thing is there.");
   }
   if (things.busy) return;
-  const std::optional<Eigen::Vector3d> place = ThingPlace(landing, *ray);
-  if (!place) return refuse(WhyNoLanding(pane));
-  Rigid3 start = tools::AboveFloor(*place, ray->direction_in_world);
-  if (things.click == ThingDesk::Click::kMove) {
+  if (things.click == Click::kInside) {
+    return thing_work_.ShowInside(where, *spot, things.model, LibraryFile(things.model));
+  }
+  if (things.click != Click::kMove && things.click != Click::kPlace) {
+    return thing_work_.Click(where, *spot);
+  }
+  const std::optional<Eigen::Vector3d> place = ThingPlace(spot->landing, spot->ray);
+  if (!place) return thing_work_.Refuse(where, WhyNoLanding(pane));
+  Rigid3 start = tools::AboveFloor(*place, spot->ray.direction_in_world);
+  if (things.click == Click::kMove) {
     const SceneObject* thing = Movable("moved");
     if (thing == nullptr) return;
     SceneObject moved = *thing;
     start.rotation = thing->parent_from_object.rotation;
     moved.parent_from_object = start;
-    return thing_edits_.Place(moved, std::nullopt, TellOfThings());
+    return thing_edits_.Place(moved, std::nullopt, thing_work_.Tell());
   }
   PlaceThing(std::exchange(things.model, ""), start);
-  things.click = ThingDesk::Click::kSelect;  // one click, one thing
+  things.click = Click::kSelect;  // one click, one thing
+}
+
+std::string Desk::LibraryFile(const std::string& model) const {
+  const auto file = library.find(model);
+  if (file == library.end()) return "";
+  std::ifstream in(file->second, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
 void Desk::PlaceThing(const std::string& model, const Rigid3& start) {
@@ -90,29 +86,25 @@ void Desk::PlaceThing(const std::string& model, const Rigid3& start) {
   draft.shape = SceneShape::kModel;
   draft.material = SceneMaterial::kVirtual;
   draft.parent_from_object = start;
+  // The library's first: an overlay's model may have the same name.
+  const std::string glb = LibraryFile(model);
+  if (!glb.empty()) return thing_edits_.PlaceModel(model, glb, draft, thing_work_.Tell());
   for (const auto& known : scene.models) {
     if (known->name != model) continue;
     draft.model = known->id;
-    return thing_edits_.Place(draft, std::nullopt, TellOfThings());
+    return thing_edits_.Place(draft, std::nullopt, thing_work_.Tell());
   }
-  const auto file = library.find(model);
-  if (file == library.end()) return SayOfThings("Not done: that model is not there.", true);
-  std::ifstream in(file->second, std::ios::binary);
-  const std::string glb{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (glb.empty()) {
-    return SayOfThings(absl::StrCat("Not done: ", file->second.string(), " cannot be read."), true);
-  }
-  thing_edits_.PlaceModel(model, glb, draft, TellOfThings());
+  thing_work_.Refuse("", "that model is not there, or cannot be read");
 }
 
 const SceneObject* Desk::Movable(const char* what) {
   const SceneObject* thing = session().scene.scene().Find(state_.things.selected_id);
   if (thing == nullptr) {
-    SayOfThings(absl::StrCat("Not ", what, ": select a thing first."), true);
+    thing_work_.Say(absl::StrCat("Not ", what, ": select a thing first."), true);
     return nullptr;
   }
   if (thing->material == SceneMaterial::kReal || thing->parent != SceneParent::kWorld) {
-    SayOfThings(
+    thing_work_.Say(
         absl::StrCat("Not ", what, ": ", thing->name,
                      thing->parent == SceneParent::kWorld ? " is real: it stays where it is."
                                                           : " moves with what it is fixed to."),
@@ -127,12 +119,13 @@ void Desk::PushThing(tools::Way way) {
   Eigen::Quaterniond eye = orbit_.world_from_camera().rotation;
   if (state_.main == Pane::kVideo) {
     const std::optional<tools::View> view = video_view();
-    if (!view) return SayOfThings(absl::StrCat("Not pushed: ", WhyNoLanding(Pane::kVideo)), true);
+    if (!view)
+      return thing_work_.Say(absl::StrCat("Not pushed: ", WhyNoLanding(Pane::kVideo)), true);
     eye = view->world_from_camera.rotation;
   }
   const SceneObject* thing = Movable("pushed");
   if (thing == nullptr) return;
-  thing_edits_.Place(*thing, tools::WayInWorld(eye, way), TellOfThings());
+  thing_edits_.Place(*thing, tools::WayInWorld(eye, way), thing_work_.Tell());
 }
 
 void Desk::TurnThing(int sign) {
@@ -141,19 +134,19 @@ void Desk::TurnThing(int sign) {
   if (thing == nullptr) return;
   SceneObject turned = *thing;
   turned.parent_from_object = tools::TurnedBy(thing->parent_from_object, sign * kThingTurn_rad);
-  thing_edits_.Place(turned, std::nullopt, TellOfThings());
+  thing_edits_.Place(turned, std::nullopt, thing_work_.Tell());
 }
 
 void Desk::RemoveThing() {
   if (state_.things.busy) return;
   if (state_.things.selected_id.empty()) {
-    return SayOfThings("Not deleted: select a thing first.", true);
+    return thing_work_.Say("Not deleted: select a thing first.", true);
   }
-  thing_edits_.Remove(state_.things.selected_id, TellOfThings());
+  thing_edits_.Remove(state_.things.selected_id, thing_work_.Tell());
 }
 
 void Desk::UndoThing() {
-  if (!state_.things.busy) thing_edits_.Undo(TellOfThings());
+  if (!state_.things.busy) thing_edits_.Undo(thing_work_.Tell());
 }
 
 }  // namespace saccade::view

@@ -31,6 +31,7 @@ void DrawPalette(const PanelContext& context) {
     const ImVec2 middle{at.x + 0.5f * size, at.y + 0.5f * size};
     ImDrawList* list = ImGui::GetWindowDrawList();
     list->AddCircleFilled(middle, 0.32f * size, ColorOf(rgba));
+    list->AddCircle(middle, 0.32f * size, Colours().dim);  // white is to be seen on light too
     if (context.desk.state().color_rgba == rgba) {
       list->AddCircle(middle, 0.46f * size, Colours().accent, 0, 2 * context.scale);
     }
@@ -112,8 +113,9 @@ void DrawRow(const PanelContext& context, const Annotation& annotation, const to
   if (selected) {
     list->AddRectFilled(at, {at.x + 3 * context.scale, at.y + size.y}, Colours().accent);
   }
-  list->AddCircleFilled({at.x + 11 * context.scale, at.y + pad + 0.5f * line}, 4 * context.scale,
-                        ColorOf(annotation.color_rgba));
+  const ImVec2 dot{at.x + 11 * context.scale, at.y + pad + 0.5f * line};
+  list->AddCircleFilled(dot, 4 * context.scale, ColorOf(annotation.color_rgba));
+  list->AddCircle(dot, 4 * context.scale, Colours().dim);
   std::string title = LabelWords(annotation, scale.metric);
   title = title.substr(0, title.find('\n'));
   if (annotation.text.empty() && title.empty()) title = tools::ShapeWord(annotation.shape);

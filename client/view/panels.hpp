@@ -30,6 +30,13 @@ void DrawTools(const PanelContext& context, const Rect& rect);
 void DrawAnnotations(const PanelContext& context, const Rect& rect);
 /// Things of the scene, in the annotations' place while their tool is in hand.
 void DrawThings(const PanelContext& context, const Rect& rect);
+/// Of it, what several clicks make: Done for a way, the pairs of a registration with its error.
+void DrawThingWork(const PanelContext& context);
+/// Of it, the marker that the selected thing moves with.
+void DrawMarkerFixing(const PanelContext& context);
+/// Remembers where what was just drawn of it is, for tests.
+void NoteButton(Desk& desk, const std::string& words);
+bool ThingButton(Desk& desk, const char* words, float width);
 /// What the head does, how far off it is, who steers it, and what can be asked of it.
 void DrawGaze(const PanelContext& context, const Rect& rect);
 /// Where the time goes, and what was lost.

@@ -3,8 +3,10 @@
 #include <absl/strings/str_format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <set>
 #include <string_view>
@@ -32,28 +34,36 @@ const char* WordOf(SceneMaterial material) {
   return "";
 }
 
-/// Remembers where what was just drawn is, for tests.
-void NoteButton(Desk& desk, const std::string& words) {
-  const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
-  desk.state().things.buttons[words] = {low.x, low.y, high.x - low.x, high.y - low.y};
-}
-
-bool ThingButton(Desk& desk, const char* words, float width) {
-  const bool pressed = ImGui::Button(words, {width, 0});
-  NoteButton(desk, words);
-  return pressed;
-}
-
 bool ClickChoice(Desk& desk, const std::string& words, const std::string& key, bool on) {
   const bool chosen = ImGui::Selectable(absl::StrCat(Types().Set(words), "###", key).c_str(), on);
   NoteButton(desk, words);
   return chosen;
 }
 
+constexpr const char* kInside = "inside";  // the library's model of a cabinet's
+constexpr float kFlat_m = 1e-4f;           // of a picture, in depth
+
 std::string PlacesWords(const std::string& model) {
   const bool vowel =
       !model.empty() && std::string_view("aeiou").find(model[0]) != std::string::npos;
   return absl::StrCat("places ", vowel ? "an " : "a ", model);
+}
+
+std::string InsideWords(const std::string& model) {
+  return model == kInside ? "shows a cabinet's inside" : absl::StrCat("shows ", model);
+}
+
+const char* MeasureWords(SceneShape shape) {
+  switch (shape) {
+    case SceneShape::kPlane:
+      return "marks a plane: 3 points";
+    case SceneShape::kRoom:
+      return "marks a room: 6 points";
+    case SceneShape::kBox:
+    case SceneShape::kModel:
+      break;
+  }
+  return "marks a box: 2 corners";
 }
 
 std::string ClickWords(const ThingDesk& things) {
@@ -64,39 +74,111 @@ std::string ClickWords(const ThingDesk& things) {
       return "moves the selected thing there";
     case Click::kPlace:
       return PlacesWords(things.model);
+    case Click::kInside:
+      return InsideWords(things.model);
+    case Click::kMeasure:
+      return MeasureWords(things.shape);
+    case Click::kOverlay:
+      return tools::Overlays()[static_cast<std::size_t>(things.overlay)].words;
+    case Click::kRegister:
+      return "registers the selected: 4 points";
   }
   return "";
 }
 
-/// Models of things that somebody can place: of the library, and what the server has besides.
-std::set<std::string> Placeable(const Desk& desk) {
-  std::set<std::string> names;
-  for (const auto& [name, file] : desk.library) names.insert(name);
-  for (const auto& model : desk.session().scene.scene().models) names.insert(model->name);
-  return names;
+bool IsFlat(const SceneModel& model) {
+  const auto [low, high] = std::ranges::minmax_element(
+      model.mesh.positions, {}, [](const Eigen::Vector3f& one) { return one.z(); });
+  return low != model.mesh.positions.end() && high->z() - low->z() < kFlat_m;
+}
+
+/// Models that somebody can let go on a floor, of the library and what the server has besides; and
+/// those that are seen through a surface.
+struct ModelChoice {
+  std::set<std::string> placed, inside;
+};
+ModelChoice Choices(const Desk& desk) {
+  ModelChoice choice;
+  for (const auto& [name, file] : desk.library) choice.placed.insert(name);
+  for (const auto& model : desk.session().scene.scene().models) {
+    (IsFlat(*model) ? choice.inside : choice.placed).insert(model->name);
+  }
+  if (choice.placed.erase(kInside) > 0) choice.inside.insert(kInside);
+  // Overlays come back as models: there they are by their clicks.
+  for (const tools::OverlayWords& overlay : tools::Overlays()) {
+    std::erase_if(choice.placed, [&](const std::string& name) {
+      return !desk.library.contains(name) &&
+             (name == overlay.name || name.starts_with(absl::StrCat(overlay.name, " ")));
+    });
+  }
+  return choice;
+}
+
+void DrawActs(Desk& desk) {
+  ThingDesk& things = desk.state().things;
+  const auto choose = [&](const std::string& words, const std::string& key, bool on,
+                          const std::function<void()>& set) {
+    if (ClickChoice(desk, words, key, on)) set();
+  };
+  choose("selects a thing", "select", things.click == Click::kSelect,
+         [&] { desk.ChooseThingClick(Click::kSelect); });
+  choose("moves the selected thing there", "move", things.click == Click::kMove,
+         [&] { desk.ChooseThingClick(Click::kMove); });
+  for (const SceneShape shape : {SceneShape::kPlane, SceneShape::kBox, SceneShape::kRoom}) {
+    const bool on = things.click == Click::kMeasure && things.shape == shape;
+    choose(MeasureWords(shape), MeasureWords(shape), on, [&] {
+      things.shape = shape;
+      desk.ChooseThingClick(Click::kMeasure);
+    });
+  }
+  choose("registers the selected: 4 points", "register", things.click == Click::kRegister,
+         [&] { desk.ChooseThingClick(Click::kRegister); });
+}
+
+void DrawOverlayChoices(Desk& desk, const std::set<std::string>& inside) {
+  ThingDesk& things = desk.state().things;
+  for (const tools::OverlayWords& overlay : tools::Overlays()) {
+    const bool on = things.click == Click::kOverlay && things.overlay == overlay.kind;
+    if (!ClickChoice(desk, overlay.words, overlay.name, on)) continue;
+    things.overlay = overlay.kind;
+    desk.ChooseThingClick(Click::kOverlay);
+  }
+  for (const std::string& name : inside) {
+    const bool on = things.click == Click::kInside && things.model == name;
+    if (ClickChoice(desk, InsideWords(name), absl::StrCat("inside ", name), on)) {
+      desk.ChooseThingClick(Click::kInside, name);
+    }
+  }
+}
+
+void DrawGroup(const char* words) {
+  ImGui::Separator();
+  ImGui::PushStyleColor(ImGuiCol_Text, Colours().dim);
+  ImGui::TextUnformatted(words);
+  ImGui::PopStyleColor();
 }
 
 void DrawChoice(Desk& desk) {
   const ThingDesk& things = desk.state().things;
+  ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted("A click");
   ImGui::SameLine();
   ImGui::SetNextItemWidth(-1);
   const bool open = ImGui::BeginCombo("##click", Types().Set(ClickWords(things)).c_str(),
-                                      ImGuiComboFlags_HeightLarge);
+                                      ImGuiComboFlags_HeightLargest);
   if (!open) return NoteButton(desk, "A click");
   NoteAbove(desk);
-  if (ClickChoice(desk, "selects a thing", "select", things.click == Click::kSelect)) {
-    desk.ChooseThingClick(Click::kSelect);
-  }
-  if (ClickChoice(desk, "moves the selected thing there", "move", things.click == Click::kMove)) {
-    desk.ChooseThingClick(Click::kMove);
-  }
-  for (const std::string& name : Placeable(desk)) {
+  const ModelChoice models = Choices(desk);
+  DrawActs(desk);
+  DrawGroup("Places");
+  for (const std::string& name : models.placed) {
     const bool on = things.click == Click::kPlace && things.model == name;
     if (ClickChoice(desk, PlacesWords(name), absl::StrCat("place ", name), on)) {
       desk.ChooseThingClick(Click::kPlace, name);
     }
   }
+  DrawGroup("Explains");
+  DrawOverlayChoices(desk, models.inside);
   ImGui::EndCombo();
 }
 
@@ -127,18 +209,20 @@ void DrawMoves(const PanelContext& context) {
 
 std::string PlaceWords(const SceneObject& thing, bool metric) {
   const Eigen::Vector3d& at = thing.parent_from_object.translation;
+  const std::string on = thing.parent == SceneParent::kMarker
+                             ? absl::StrCat(" on ", thing.marker_family, " ", thing.marker_id)
+                             : "";
   const Eigen::Vector3d z = thing.parent_from_object.rotation * Eigen::Vector3d::UnitZ();
   const double turn_deg = std::atan2(z.x(), z.z()) * 180 / std::numbers::pi;
-  return absl::StrFormat("%s: x %.3f  y %.3f  z %.3f %s, turn %.1f deg", thing.name, at.x(), at.y(),
-                         at.z(), metric ? "m" : "units of the map", turn_deg);
+  return absl::StrFormat("%s%s: x %.3f  y %.3f  z %.3f %s, turn %.1f deg", thing.name, on, at.x(),
+                         at.y(), at.z(), metric ? "m" : "units of the map", turn_deg);
 }
 
 void DrawRows(const PanelContext& context) {
   Desk& desk = context.desk;
   const Scene& scene = desk.session().scene.scene();
   if (scene.objects.empty()) {
-    return Wrapped(Colours().dim,
-                   "Nothing yet. Choose what a click places, then click in the map or the video.");
+    return Wrapped(Colours().dim, "Nothing yet: measure the room, or place a thing.");
   }
   for (const SceneObject& thing : scene.objects) {
     const bool on = thing.id == desk.state().things.selected_id;
@@ -152,19 +236,23 @@ void DrawRows(const PanelContext& context) {
 
 void DrawThings(const PanelContext& context, const Rect& rect) {
   Desk& desk = context.desk;
-  const ThingDesk& things = desk.state().things;
-  BeginPanel("things", rect, Colours().panel);
+  ThingDesk& things = desk.state().things;
+  things.buttons.clear();
+  BeginPanel("things", rect, Colours().panel, true);
   ImGui::PushFont(context.fonts.bold);
   ImGui::TextUnformatted("Things");
   ImGui::PopFont();
   DrawChoice(desk);
   Wrapped(things.warn ? Colours().warn : Colours().text, Types().Set(things.said));
+  DrawThingWork(context);
   DrawMoves(context);
   const SceneObject* selected = desk.session().scene.scene().Find(things.selected_id);
   Wrapped(Colours().dim, selected != nullptr
                              ? Types().Set(PlaceWords(*selected, desk.session().metric()))
                              : "Select a thing to read its place.");
-  ImGui::BeginChild("rows");
+  DrawMarkerFixing(context);
+  const float least = 5 * ImGui::GetFrameHeight();
+  ImGui::BeginChild("rows", {0, std::max(ImGui::GetContentRegionAvail().y, least)});
   DrawRows(context);
   ImGui::EndChild();
   EndPanel();

@@ -4,17 +4,17 @@
 
 #include <cmath>
 #include <cstring>
-#include <limits>
+#include <map>
 #include <sstream>
+#include <utility>
 
 namespace saccade {
 namespace {
 
-/// glTF's colours are linear, ours as a screen shows them (sRGB, IEC 61966-2-1).
-double Linear(std::uint8_t value) {
-  const double v = value / 255.0;
-  return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-}
+constexpr std::uint32_t kGrey = 0xb4b4b4ff;
+
+/// glTF's colours are linear, ours as a screen shows them; as ReadGlb undoes it.
+double Linear(std::uint8_t value) { return std::pow(value / 255.0, 2.2); }
 
 class SceneWriter {
  public:
@@ -151,6 +151,22 @@ absl::StatusOr<std::string> WriteGlb(const std::vector<GlbPart>& parts) {
   SceneWriter writer;
   for (const GlbPart& part : parts) writer.Add(part);
   return writer.Finish();
+}
+
+absl::StatusOr<std::string> WriteGlb(const TriangleMesh& mesh) {
+  std::map<std::uint32_t, GlbPart> parts;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::uint32_t color = mesh.colors_rgba.empty() ? kGrey : mesh.colors_rgba[i];
+    GlbPart& part = parts[color];
+    part.color_rgba = color;
+    for (const std::uint32_t corner : mesh.triangles[i]) {
+      part.triangles.push_back(static_cast<std::uint32_t>(part.positions.size()));
+      part.positions.push_back(mesh.positions[corner]);
+    }
+  }
+  std::vector<GlbPart> list;
+  for (auto& [color, part] : parts) list.push_back(std::move(part));
+  return WriteGlb(list);
 }
 
 }  // namespace saccade

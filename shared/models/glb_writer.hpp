@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "shared/scene/triangle_mesh.hpp"
+
 namespace saccade {
 
 /// A part of a scene: either triangles with a colour at each corner, or lines.
@@ -22,5 +24,8 @@ struct GlbPart {
 /// A GLB file (glTF 2.0, everything in one), a node for each part, turned into glTF's frame (y up).
 /// Colours are what they look like: nothing is to be lit. InvalidArgument: there is nothing in it.
 absl::StatusOr<std::string> WriteGlb(const std::vector<GlbPart>& parts);
+/// `mesh` as a part for each colour, corners not shared. ReadGlb gives the same triangles back,
+/// sorted by colour.
+absl::StatusOr<std::string> WriteGlb(const TriangleMesh& mesh);
 
 }  // namespace saccade

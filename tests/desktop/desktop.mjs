@@ -1,6 +1,6 @@
 // saccade-client in a real window, as its own trace tells what it shows.
 import { spawn } from 'node:child_process';
-import { closeSync, openSync, readFileSync, readSync } from 'node:fs';
+import { closeSync, openSync, readFileSync, readSync, rmSync } from 'node:fs';
 import { join } from 'node:path';
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -9,6 +9,7 @@ export class Desktop {
   /** `args` beside --trace; `folder`: home, settings and trace. */
   static async start(binary, args, screen, folder) {
     const trace = join(folder, 'trace.jsonl');
+    rmSync(trace, { force: true }); // of one before it
     const child = spawn(binary, [...args, '--trace', trace], {
       stdio: ['ignore', 'ignore', 'pipe'],
       env: {
@@ -88,7 +89,7 @@ export class Desktop {
       }
       await sleep(15);
     }
-    throw new Error(`never: ${what}; ${JSON.stringify(this.lines.at(-1))?.slice(0, 600)}`);
+    throw new Error(`never: ${what}; ${JSON.stringify(this.lines.at(-1))?.slice(0, 3000)}`);
   }
 
   /**

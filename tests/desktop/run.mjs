@@ -1,6 +1,7 @@
 // saccade-client in a real window against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--client PATH] [--server PATH] [--cli PATH] [--evaluator PATH] [--seed N] [--size WxH]
 //        [--shots DIR] [--part desktop|gaze|things]   (gaze: the turning of the head, two wearers in tabs, notes, ink)
+// By hand alone: --part shots (pictures at seven sizes, light and dark).
 import { spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync } from 'node:fs';
 import { createServer } from 'node:net';
@@ -53,6 +54,7 @@ const parts = {
   desktop: async () => (await import('./checks.mjs')).runDesktop,
   gaze: async () => (await import('./work.mjs')).runWork,
   things: async () => (await import('./things.mjs')).runThings,
+  shots: async () => (await import('./shots.mjs')).runShots,
 };
 if (!(options.part in parts)) throw new Error(`--part: one of ${Object.keys(parts).join(', ')}`);
 const runPart = await parts[options.part]();
@@ -88,6 +90,13 @@ const ask = (...words) => {
 };
 
 const context = { failures: 0, options, folder, grpc, start, source };
+context.resize = async (size) => {
+  context.screen.stop();
+  options.size = size;
+  const own = join(folder, size); // the old one takes its file away when it ends
+  mkdirSync(own);
+  context.screen = await Screen.start(own, ...size.split('x').map(Number));
+};
 context.check = (name, ok, figures) => {
   console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
   if (!ok) ++context.failures;
@@ -120,6 +129,7 @@ try {
   failures = context.failures;
 } catch (error) {
   console.error(error);
+  context.shot('failed');
 } finally {
   await context.desktop?.stop('SIGKILL').catch(() => undefined);
   await context.server?.stop();

@@ -5,8 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/eval/scene/figure_room.hpp"
-#include "server/scene/overlay_things.hpp"
 #include "server/scene/placement.hpp"
+#include "shared/models/overlay_things.hpp"
 #include "shared/models/shapes.hpp"
 
 namespace saccade {

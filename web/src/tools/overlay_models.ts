@@ -13,7 +13,7 @@ import { DOWN } from './thing_places';
 
 /*
  * What is laid over a room to explain it (Koller et al. 1997, figure 7), as triangles in a thing's own frame:
- * x right, y down, z away [m]. Shapes as server/scene/overlay_things.cpp has them.
+ * x right, y down, z away [m]. Shapes as shared/models/overlay_things.cpp has them.
  */
 
 /** Triangles of one colour, three corners each. */

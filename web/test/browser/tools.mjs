@@ -143,7 +143,7 @@ async function nameIsAskedOnce(context) {
   const { check, chromium, url } = context;
   context.bo = await Expert.open(chromium, `${url}/`, { ...OPEN, nameless: true });
   const { page } = context.bo;
-  await page.locator('dialog[open] #own-name').waitFor({ timeout: 10_000 });
+  await page.locator('dialog[open] #own-name').waitFor({ timeout: 30_000 });
   await dialogChecks(context, 'dialog of the name', context.bo);
   await page.keyboard.type('Bo');
   await page.keyboard.press('Enter');

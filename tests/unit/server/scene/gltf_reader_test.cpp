@@ -8,6 +8,7 @@
 #include <random>
 
 #include "shared/models/glb_writer.hpp"
+#include "shared/models/shapes.hpp"
 #include "tests/unit/server/scene/glb_builder.hpp"
 
 namespace saccade::gltf_reader_test {
@@ -27,6 +28,22 @@ TEST(ReadGlb, TurnsGltfsFrameIntoOurs) {
   EXPECT_EQ(mesh->positions[2], Eigen::Vector3f(0, -2, -0.5f));  // up is -y, to the viewer -z
   // A half turn about x: outside stays outside.
   EXPECT_EQ(mesh->triangles[0], (TriangleMesh::Triangle{0, 1, 2}));
+}
+
+TEST(ReadGlb, ReadsWhatWriteGlbWrote) {
+  TriangleMesh mesh = BoxMesh({0.3, 0.2, 0.1}, 0x2bb16cff);
+  Append(PlaneMesh(1, 2, 0x10203080), {Eigen::Quaterniond::Identity(), {0, -1, 3}}, 1, mesh);
+  const absl::StatusOr<TriangleMesh> read = ReadGlb(*WriteGlb(mesh));
+  ASSERT_TRUE(read.ok()) << read.status();
+  ASSERT_EQ(read->triangles.size(), mesh.triangles.size());
+  const std::size_t plane = 2;  // of triangles; its colour is the lower number
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::size_t j = (i + plane) % mesh.triangles.size();
+    EXPECT_EQ(read->colors_rgba[j], mesh.colors_rgba[i]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(read->positions[read->triangles[j][k]], mesh.positions[mesh.triangles[i][k]]);
+    }
+  }
 }
 
 TEST(ReadGlb, AppliesTheTransformsOfNodesAndColours) {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "server/scene/light_fit.hpp"
-#include "server/scene/overlay_things.hpp"
+#include "shared/models/overlay_things.hpp"
 #include "shared/models/shapes.hpp"
 
 namespace saccade::sight_test {

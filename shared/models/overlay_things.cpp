@@ -1,4 +1,4 @@
-#include "server/scene/overlay_things.hpp"
+#include "shared/models/overlay_things.hpp"
 
 #include <cmath>
 
