@@ -15,7 +15,9 @@ import { ThingMeshes } from './thing_meshes';
 import { type ViewName, Viewpoint } from './viewpoint';
 
 const FRUSTUM_SHARE = 0.14; // of the distance looked from: the live picture keeps its size
+const SMALL_SHARE = 0.09; // where it would hide the place
 
+const MOST_STEP_MS = 200; // a slow page still moves in steps one can follow
 const REVEAL_PX = 40; // nearer to the edge than that is not in view
 
 /** True without a graphics card, where smooth edges would cost more than the rest together. */
@@ -183,7 +185,7 @@ export class MapView {
 
   /** Draws if anything changed; true if so. */
   draw(nowMs: number, shown: ShownFrame | undefined): boolean {
-    const elapsed = Math.min(nowMs - this.lastMs, 100);
+    const elapsed = Math.min(nowMs - this.lastMs, MOST_STEP_MS);
     this.lastMs = nowMs;
     if (nowMs - this.contentMs >= this.pictureIntervalMs) this.updateContent(nowMs, shown);
     this.steer(shown);
@@ -193,7 +195,8 @@ export class MapView {
     this.aimLens();
     this.cloud.object.visible = this.showsDots;
     this.grid.visible = !this.showsSurfaces; // the place has a ground of its own
-    const pictureM = this.eye.pictureM(FRUSTUM_SHARE);
+    this.path.object.visible = !this.eye.turnsHead; // it would go through one's head
+    const pictureM = this.eye.pictureM(this.showsSurfaces ? SMALL_SHARE : FRUSTUM_SHARE);
     this.frustum.resize(pictureM || 1e-6);
     this.renderer.clear();
     this.things.lightFor(this.lens);

@@ -87,10 +87,12 @@ export class OrbitCamera {
     if (jumps) this.now = this.goal;
   }
 
-  /** Eases to look straight down at a sphere [m]. */
+  /** Eases to look straight down at a sphere [m], the world's axes along the pane's. */
   lookDown(target: Vec3, radius: number): void {
     this.lookAt(target, radius);
-    this.goal = { ...this.goal, pitch: MAX_PITCH };
+    const quarter = Math.PI / 2;
+    const yaw = Math.round(this.goal.yaw / quarter) * quarter;
+    this.goal = { ...this.goal, yaw, pitch: MAX_PITCH };
   }
 
   /** Eases to look down by so much [rad]. */

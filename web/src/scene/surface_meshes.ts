@@ -5,7 +5,9 @@ import type { SurfaceChunk } from '../gen/saccade/v1/surface_pb';
 import type { SurfaceBook } from '../session/surface_book';
 import { type SurfaceMesh, toMesh } from '../session/surface_mesh';
 
-const UNPACK_MS = 4; // of a screen frame: a chunk takes a fraction of a millisecond
+const UNPACK_MS = 4; // of a screen frame: a chunk takes less than one
+const UNPACK_SHARE = 0.15; // of longer ones: slow pages are to have the place as well
+const MOST_UNPACK_MS = 100;
 
 interface Shown {
   readonly mesh: SurfaceMesh;
@@ -23,6 +25,7 @@ export class SurfaceMeshes {
   private readonly shown = new Map<string, Shown>();
   private readonly material = surfaceMaterial();
   private ready = false;
+  private lastMs = 0;
   private warned = false;
 
   constructor(private readonly book: SurfaceBook) {
@@ -54,8 +57,11 @@ export class SurfaceMeshes {
   update(): boolean {
     if (!this.ready) return false;
     const begin = performance.now();
+    const share = Math.min(UNPACK_SHARE * (begin - this.lastMs), MOST_UNPACK_MS);
+    const end = begin + Math.max(UNPACK_MS, share);
+    this.lastMs = begin;
     let changed = false;
-    while (performance.now() - begin < UNPACK_MS) {
+    while (performance.now() < end) {
       const next = this.book.takeChanged();
       if (!next) break;
       this.put(next.name, next.chunk);

@@ -29,6 +29,8 @@ export class Viewpoint {
   readonly orbit = new OrbitCamera();
   /** What keys hold down: -1 to 1 to the right, and forward. */
   stride = { right: 0, forward: 0 };
+  /** It is where it was to go. */
+  settled = true;
   private wearer: Wearer | undefined;
   private from: { readonly pose: Rigid3; readonly deg: number } | undefined;
   private easedMs = 0;
@@ -111,7 +113,9 @@ export class Viewpoint {
   /** Once per screen frame; true while something moves. */
   step(elapsedMs: number, wearer: Wearer | undefined): boolean {
     let moves = this.orbit.step(elapsedMs);
-    if (this.view === 'wearer' && wearer && wearer !== this.wearer) moves = true;
+    this.settled = !moves && !this.from;
+    const pose = wearer?.worldFromCamera;
+    if (this.view === 'wearer' && pose && pose !== this.wearer?.worldFromCamera) moves = true;
     this.wearer = wearer ?? this.wearer;
     if (this.from) {
       this.easedMs += elapsedMs;

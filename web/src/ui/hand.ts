@@ -103,8 +103,14 @@ export class Hand {
       dataset['pressed'] = `${current.facts.frameId} ${pixel.u} ${pixel.v}`;
     }
     const late = LATE.includes(this.state.tool);
+    const landing = pixel && aim.landing(pane, pixel, late);
+    if (pane === 'map' && pixel) {
+      const { x = NaN, y = NaN, z = NaN } = landing?.pointInWorld ?? {};
+      const said = [pixel.u, pixel.v, landing?.how ?? 'nothing', x, y, z];
+      aim.map.element.dataset['pressed'] = said.join('|'); // for tests
+    }
     this.pressed = pixel && {
-      landing: aim.landing(pane, pixel, late),
+      landing,
       picked: aim.pick(pane, pixel),
       spot: this.state.tool === 'thing' ? spotAt(aim, pane, pixel) : undefined,
     };

@@ -11,7 +11,7 @@ import { isPlaced, type Pose } from '../session/types';
 import type { MapContent } from '../tools/landing';
 import { hitSurfaces } from '../tools/surface_rays';
 import type { AppState } from './app_state';
-import { h } from './dom';
+import { h, setAttribute } from './dom';
 import { keepLook, MapControls, nextLook, nextView, recallLook } from './map_controls';
 import { Pane } from './pane';
 import type { PictureCache } from './picture_cache';
@@ -134,6 +134,8 @@ export class MapPane extends Pane {
     map.selectedThing = this.state.tool === 'thing' ? this.state.thingId : '';
     const moved = map.draw(nowMs, this.eye());
     this.controls.update(this.shows, map.eye.view);
+    const { view: from, settled } = map.eye;
+    setAttribute(this.canvas, 'data-from', settled ? from : `to ${from}`);
     this.drawPointers();
     const { version } = this.session.annotations;
     const gaze = gazeKey(this.session.gaze);
@@ -176,6 +178,9 @@ export class MapPane extends Pane {
     const { translation: t, rotation: q } = view.worldFromCamera;
     this.canvas.dataset['eye'] = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].join(' ');
     this.canvas.dataset['focalPx'] = String(view.camera.intrinsics.fx);
+    this.canvas.dataset['surfaces'] = this.map?.showsSurfaces
+      ? String(this.map.surfaces.triangles)
+      : '0';
   }
 
   /** The target, and the line to it from the camera as it is in the picture shown. */

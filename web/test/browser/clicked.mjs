@@ -6,7 +6,7 @@ const OUTLINE_PX = 3; // within this of an outline a click may mean either side 
 const OUTLINE_SHARE = 0.03; // of the depth: what makes an outline
 
 /** Whether depths differ by an outline's step within reach of a pixel; beyond the picture nothing is. */
-function atOutline(depths, [u, v]) {
+export function atOutline(depths, [u, v]) {
   const around = [];
   for (let dv = -OUTLINE_PX; dv <= OUTLINE_PX; ++dv) {
     for (let du = -OUTLINE_PX; du <= OUTLINE_PX; ++du) around.push(depths.at([u + du, v + dv]));

@@ -8,7 +8,7 @@
 // what they draw, point at and change. keys: everything without a mouse. shapes: marks by their pixels, page
 // against server. wear: a phone as the camera, and an expert, each in a network of its own. waiting: who comes
 // waits to be let in. talk: voices, messages, the pause of the picture, the first task. oidc: a firm's people sign
-// in. calibrate: a lens from pictures of a board. By hand alone: clicks (over a late network), shots (pictures at seven sizes, light and dark).
+// in. calibrate: a lens from pictures of a board. surfaces: the place, against the simulator's depth. By hand alone: surfaces-load (a large room), clicks (over a late network), shots (pictures at seven sizes, light and dark).
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -60,6 +60,8 @@ const PARTS = {
   shots: async () => (await import('./shots.mjs')).runShots,
   things: async () => (await import('./things.mjs')).runThings,
   calibrate: async () => (await import('./calibrate.mjs')).runCalibrate,
+  surfaces: async () => (await import('./surfaces.mjs')).runSurfaces,
+  'surfaces-load': async () => (await import('./surfaces_load.mjs')).runSurfacesLoad,
   oidc: async () => (await import('./oidc.mjs')).runOidc,
 };
 if (!(options.part in PARTS)) throw new Error(`--part: one of ${Object.keys(PARTS).join(', ')}`);
