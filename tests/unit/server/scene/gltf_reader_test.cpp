@@ -79,7 +79,7 @@ TEST(WriteGlb, WhatIsWrittenIsReadBackWithItsColours) {
   ASSERT_EQ(mesh->triangles.size(), 2u);  // lines have none
   EXPECT_LT((mesh->positions[2] - Eigen::Vector3f(0, 2, 1)).norm(), 1e-6f);
   EXPECT_EQ(mesh->triangles[0], (TriangleMesh::Triangle{0, 1, 2}));
-  EXPECT_FALSE(WriteGlb({}).ok());
+  EXPECT_FALSE(WriteGlb(std::vector<GlbPart>()).ok());
 }
 
 TEST(ReadGlb, TornAtAnyByteIsRefused) {
