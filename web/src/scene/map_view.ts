@@ -17,7 +17,7 @@ import { type ViewName, Viewpoint } from './viewpoint';
 const FRUSTUM_SHARE = 0.14; // of the distance looked from: the live picture keeps its size
 const SMALL_SHARE = 0.09; // where it would hide the place
 
-const MOST_STEP_MS = 200; // a slow page still moves in steps one can follow
+const MOST_STEP_MS = 1000;
 const REVEAL_PX = 40; // nearer to the edge than that is not in view
 
 /** True without a graphics card, where smooth edges would cost more than the rest together. */

@@ -132,24 +132,17 @@ const surfaceMaterial = (): THREE.ShaderMaterial =>
     vertexShader: `
       in vec3 paint;
       out vec3 photo;
-      out vec3 facing;
-      out vec3 line;
       void main() {
         vec4 eye = modelViewMatrix * vec4(position, 1.0);
-        photo = paint;
-        line = eye.xyz;
-        facing = mat3(modelViewMatrix) * normal;
+        vec3 facing = mat3(modelViewMatrix) * normal;
+        float toward = abs(dot(facing, eye.xyz)) * inversesqrt(max(dot(facing, facing) * dot(eye.xyz, eye.xyz), 1e-20));
+        photo = min(paint * (0.78 + 0.26 * toward), vec3(1.0));
         gl_Position = projectionMatrix * eye;
       }`,
     fragmentShader: `
       in vec3 photo;
-      in vec3 facing;
-      in vec3 line;
       out vec4 color;
       void main() {
-        float toward = abs(dot(normalize(facing), normalize(line)));
-        float light = 0.78 + 0.26 * toward;
-        if (!gl_FrontFacing) light *= 0.4;
-        color = vec4(min(photo * light, vec3(1.0)), 1.0);
+        color = vec4(gl_FrontFacing ? photo : 0.4 * photo, 1.0);
       }`,
   });

@@ -20,6 +20,7 @@ interface Sphere {
 const ORBIT_DEG = 45; // upright
 const WALK_DEG = 62;
 const EASE_MS = 200;
+const MOST_STRIDE_MS = 200; // a slow page walks in steps one can follow
 const WALKS_A_SECOND = 0.6; // of the radius of what is mapped
 const AHEAD = 0.5; // of that radius: what is turned to when walking ends
 
@@ -124,7 +125,7 @@ export class Viewpoint {
     }
     const { right, forward } = this.stride;
     if (this.view === 'walk' && (right !== 0 || forward !== 0)) {
-      const way = (WALKS_A_SECOND * this.radius * elapsedMs) / 1000;
+      const way = (WALKS_A_SECOND * this.radius * Math.min(elapsedMs, MOST_STRIDE_MS)) / 1000;
       this.orbit.walk(right * way, forward * way);
       moves = true;
     }

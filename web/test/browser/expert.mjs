@@ -36,7 +36,8 @@ export class Expert {
   /**
    * `home`: whose certificates count; `prefix`: a command that runs the browser elsewhere; `flags`: more of
    * the browser's; `viewport`: of the page; `nameless`: who sits there is asked for a name;
-   * `firstTime`: the page offers its first task; `init`: runs in the page before anything of its own.
+   * `firstTime`: the page offers its first task; `look`: what the map shows, dots where not said (tests click dots,
+   * and software GPUs have enough to do); `init`: runs in the page before anything of its own.
    */
   static async open(
     executablePath,
@@ -48,6 +49,7 @@ export class Expert {
       viewport = { width: 1280, height: 720 },
       nameless = false,
       firstTime = false,
+      look = 'dots',
       init,
     } = {},
   ) {
@@ -68,6 +70,10 @@ export class Expert {
         if (window.location.origin !== 'null') localStorage.setItem('saccade.firstTask', 'done');
       });
     }
+    await context.addInitScript((kept) => {
+      if (window.location.origin === 'null' || localStorage.getItem('saccade.mapLook')) return;
+      localStorage.setItem('saccade.mapLook', kept);
+    }, look);
     page.on('pageerror', (error) => expert.errors.push(error.message));
     const address = new URL(url);
     if (!nameless && !address.searchParams.has('name')) address.searchParams.set('name', 'expert');

@@ -31,7 +31,7 @@ export async function runLayout({ server: binary, chromium, seed, shots, folder 
     if (problems.length > 0) ++context.failures;
   };
   try {
-    const expert = await Expert.open(chromium, `${server.http}/?name=Ann`);
+    const expert = await Expert.open(chromium, `${server.http}/?name=Ann`, { look: '' });
     context.page = expert.page;
     context.expert = expert;
     context.cdp = await expert.page.context().newCDPSession(expert.page);

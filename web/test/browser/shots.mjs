@@ -56,7 +56,7 @@ export async function runShots({ server: binary, chromium, seed, shots, folder }
   try {
     const transport = createGrpcWebTransport({ baseUrl: server.http });
     context.client = (service) => createClient(service, transport);
-    context.expert = await Expert.open(chromium, `${server.http}/?name=Ann`);
+    context.expert = await Expert.open(chromium, `${server.http}/?name=Ann`, { look: '' });
     await context.expert.waitForStatus(/^tracking/, 60_000);
     await context.expert.page.locator('canvas.map[data-eye]').waitFor();
     const points = await fill(context);

@@ -47,9 +47,10 @@ export async function runSurfaces({ server: binary, evaluator, chromium, seed, s
     heard.catch(() => undefined); // said where it is waited for
     context.expert = await Expert.open(chromium, server.http, {
       viewport: { width: 1000, height: 640 },
+      look: '', // as whoever comes for the first time
     });
     const { expert } = context;
-    await expert.waitForStatus(/^tracking/, 60_000);
+    await expert.waitForStatus(/^tracking/, 120_000);
     await expert.page.locator('canvas.map[data-eye]').waitFor();
     await appear(context);
     const places = await heldAgainstTruth(context);
@@ -119,7 +120,7 @@ async function appear(context) {
 
 /** Once the map is drawn from there, and all is still. */
 const drawnFrom = ({ expert }, view) =>
-  expert.page.locator(`canvas.map[data-from="${view}"]`).waitFor({ timeout: 30_000 });
+  expert.page.locator(`canvas.map[data-from="${view}"]`).waitFor({ timeout: 60_000 });
 
 /** Stands where the wearer stood at one frame; its id and pose. */
 async function standStill(context) {

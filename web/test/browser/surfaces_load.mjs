@@ -127,7 +127,7 @@ export async function runSurfacesLoad({ server: binary, chromium, seed, folder, 
   let expert;
   let failures = 0;
   try {
-    expert = await Expert.open(chromium, server.http);
+    expert = await Expert.open(chromium, server.http, { look: '' });
     const { page, profile } = expert;
     await expert.waitForStatus(/^tracking/, 60_000);
     await page.locator('canvas.map[data-eye]').waitFor();
