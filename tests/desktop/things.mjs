@@ -50,7 +50,8 @@ export async function pressButton(context, words) {
   );
   context.tells = shown.things.tells;
   screen.click(middle(shown.things.buttons[words]));
-  await sleep(300);
+  // Pressed in one picture and let go in the next: until then the pointer stays.
+  await desktop.until('drawn', ({ seq }) => seq >= shown.seq + 4, 15_000);
 }
 
 /** Where a point of the world is in the window, in the map. */

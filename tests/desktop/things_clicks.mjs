@@ -26,15 +26,21 @@ function features(context, count, wanted = () => true) {
   const seen = context
     .map()
     .features.filter(({ depth_known }) => depth_known)
-    .map(({ point_in_world_m: point }) => ({ point, at: inMap(context, point) }))
+    .map(({ id, point_in_world_m: point, covariance_in_world_m2_upper: [xx, , , yy, , zz] }) => ({
+      ...{ id, point, sigmaM: Math.sqrt(xx + yy + zz) },
+      at: inMap(context, point),
+    }))
     .filter(({ at }) => at);
   const away = (a, b) => length(minus(a.at, b.at));
   const inside = ([x, y]) =>
     x > paneX + 20 && y > paneY + 20 && x < paneX + width - 20 && y < paneY + height - 20;
   const covered = ([x, y]) => x < insetX + insetWidth + 20 && y > insetY - 20;
+  const sigmas = seen.map(({ sigmaM }) => sigmaM).sort((a, b) => a - b);
+  const sure = sigmas[Math.floor(0.6 * sigmas.length)]; // the others move while the map is made
   const free = seen.filter(
     (one) =>
       inside(one.at) &&
+      one.sigmaM <= sure &&
       !covered(one.at) &&
       seen.every((other) => other === one || away(one, other) > ALONE_PX),
   );
@@ -49,25 +55,53 @@ function features(context, count, wanted = () => true) {
   return chosen;
 }
 
-/** Where a feature is now: the map goes on. */
-const clickPoint = async (context, point) => {
+/** The map is eased to where it is to be seen from. */
+async function standsStill({ desktop }) {
+  for (let i = 0, before = ''; i < 40; ++i, await sleep(400)) {
+    const eye = String(desktop.look().map.eye);
+    if (eye === before) return;
+    before = eye;
+  }
+}
+
+async function clickPoint(context, point) {
   context.tells = context.desktop.look().things.tells;
   context.screen.click(inMap(context, point));
   await sleep(400);
-};
+}
+
+/** Where it is now, and again where it has moved from under the pointer, as a person would. */
+async function clickFeature(context, { id, point }) {
+  for (let tries = 0; tries < 3; ++tries) {
+    await context.desktop.until('tracking', ({ status }) => status.startsWith('tracking'), 30_000);
+    const now = context.map().features.find((one) => one.id === id);
+    await clickPoint(context, now?.point_in_world_m ?? point);
+    const { tells } = context;
+    const { things } = await context.desktop.until(
+      'an answer',
+      (shown) => shown.things.tells > tells,
+    );
+    if (!/nothing was measured/.test(things.said)) return;
+  }
+}
 
 /** A box by two corners, a plane by three points, each a feature. */
 export async function measured(context) {
   const { check, shot } = context;
+  const [left, top, width, height] = context.desktop.look().map.pane;
   context.screen.press('h');
-  await sleep(800);
+  context.screen.move([left + width / 2, top + height / 2]);
+  await sleep(1500);
+  for (const wheel of [4, 5]) context.screen.input('click', wheel); // held: it frames itself no more
+  await standsStill(context);
+  await sleep(4000); // the map becomes sure
   await choose(context, 'marks a box: 2 corners');
   const low = (one, [first]) =>
     !first || minus(one.point, first.point).every((d) => Math.abs(d) > 0.03);
   const [a, b] = features(context, 2, low);
-  await clickPoint(context, a.point);
+  await clickFeature(context, a);
   shot('things-measuring');
-  await clickPoint(context, b.point);
+  await clickFeature(context, b);
   const box = await says(context, /^box: |Not/);
   const off = length(
     minus(named(context, 'box')?.size_m ?? [9, 9, 9], minus(a.point, b.point).map(Math.abs)),
@@ -75,7 +109,7 @@ export async function measured(context) {
   check('a box is measured by two corners', off < NEAR_M, `"${box}", ${mm(off)} from the features`);
   await choose(context, 'marks a plane: 3 points');
   const corners = features(context, 3);
-  for (const { point } of corners) await clickPoint(context, point);
+  for (const corner of corners) await clickFeature(context, corner);
   const plane = await says(context, /^plane: |Not/);
   const side = length(minus(corners[1].point, corners[0].point));
   const wide = named(context, 'plane')?.size_m[0] ?? NaN;
@@ -131,7 +165,8 @@ function glbOf(points) {
 /** A model of four features, put beside them, finds its way back by four pairs of clicks. */
 export async function registered(context) {
   const { ask, check, desktop, folder, shot } = context;
-  const points = features(context, 4).map(({ point }) => point);
+  const four = features(context, 4);
+  const points = four.map(({ point }) => point);
   const file = join(folder, 'four.glb');
   writeFileSync(file, glbOf(points));
   ask('scene', 'add', '--model', file, '--name', 'four', '--at', OFF_M.join(','));
@@ -145,7 +180,7 @@ export async function registered(context) {
       point.map((value, axis) => value + OFF_M[axis]),
     );
     await says(context, /the same point|Not/);
-    await clickPoint(context, point);
+    await clickFeature(context, four[i]);
     await desktop.until(`pair ${i + 1}`, ({ things }) => things.pairs === i + 1, 5000);
   }
   const told = await desktop.until(

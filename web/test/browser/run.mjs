@@ -1,7 +1,7 @@
 // The page in real Chromium against the real server on the simulator; prints what it measured.
 // usage: run.mjs [--server PATH] [--evaluator PATH] [--chromium PATH] [--seed N] [--shots DIR]
 //        [--only CHECK,CHECK]  (of tools; of clicks the view)  [--count N]  (of clicks)
-//        [--part PART]
+//        [--size WxH]  (of both windows of tools)  [--part PART]
 // page: what is in no other part. gaze: the turning of the head. dots: measured features while the wearer turns.
 // person: typing, keys, tabs, a reload. invite: TLS, invites and what ends them, from another address than
 // loopback where this may make a network namespace. layout: sizes of window and barriers. tools: two people and
@@ -27,6 +27,7 @@ const { values: options } = parseArgs({
     part: { type: 'string', default: 'page' },
     only: { type: 'string' },
     count: { type: 'string' },
+    size: { type: 'string', default: '1000x640' },
   },
 });
 

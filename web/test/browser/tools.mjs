@@ -16,17 +16,19 @@ import { byKeyboard } from './tools_keys.mjs';
 import { togetherChecks } from './together.mjs';
 
 // Two pages are drawn without a graphics card: what tracks the camera goes first.
-const OPEN = { viewport: { width: 1000, height: 640 }, prefix: ['nice', '-n', '5'] };
+const PREFIX = ['nice', '-n', '5'];
 
 export const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-export async function runTools({ server: binary, chromium, seed, shots, folder, only }) {
+export async function runTools({ server: binary, chromium, seed, shots, folder, only, size }) {
+  const [width, height] = size.split('x').map(Number);
   const server = await startServer(binary, [
     ...['--source', `sim:desk?seed=${seed}&motion=stand&fps=10`],
     ...['--data-dir', join(folder, 'tools-data')],
     ...['--grpc', '127.0.0.1:0', '--http', '127.0.0.1:0'],
   ]);
   const context = { failures: 0, shots, url: server.http, folder, chromium };
+  context.open = { viewport: { width, height }, prefix: PREFIX };
   context.wants = (name) => !only || only.split(',').includes(name);
   context.check = (name, ok, figures) => {
     console.log(`${ok ? 'ok  ' : 'FAIL'}  ${name}: ${figures}`);
@@ -39,7 +41,7 @@ export async function runTools({ server: binary, chromium, seed, shots, folder, 
     context.map = createClient(MapService, transport);
     const joined = await context.session.join({ displayName: 'test', role: Role.EXPERT });
     context.owner = joined.sessionId;
-    context.ann = await Expert.open(chromium, `${server.http}/?name=Ann`, OPEN);
+    context.ann = await Expert.open(chromium, `${server.http}/?name=Ann`, context.open);
     await context.ann.waitForStatus(/^tracking/, 60_000);
     await context.ann.page.locator('canvas.map[data-eye]').waitFor();
     await nameIsAskedOnce(context);
@@ -141,7 +143,7 @@ async function dialogChecks(context, name, expert = context.ann) {
 
 async function nameIsAskedOnce(context) {
   const { check, chromium, url } = context;
-  context.bo = await Expert.open(chromium, `${url}/`, { ...OPEN, nameless: true });
+  context.bo = await Expert.open(chromium, `${url}/`, { ...context.open, nameless: true });
   const { page } = context.bo;
   await page.locator('dialog[open] #own-name').waitFor({ timeout: 30_000 });
   await dialogChecks(context, 'dialog of the name', context.bo);
