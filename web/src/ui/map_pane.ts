@@ -197,13 +197,16 @@ export class MapPane extends Pane {
     const refusal = this.state.refusal('map');
     const { map, pose } = this.session;
     const { map: map3d } = this;
-    const missing = map3d && surfaceWords(this.shows, map3d.surfaces, this.session.surface.state);
+    const large = this.state.main === 'map';
+    const missing =
+      large && map3d && surfaceWords(this.shows, map3d.surfaces, this.session.surface.state);
     let text = '';
     if (refusal) text = refusal;
     else if (!map3d) text = 'loading the map';
     else if (map.features.size === 0) text = 'nothing mapped yet';
     else if (missing) text = missing;
-    else if (map3d.eye.view === 'walk') text = 'W A S D or arrows walk, drag to look; Esc ends it';
+    else if (large && map3d.eye.view === 'walk')
+      text = 'W A S D or arrows walk, drag to look; Esc ends it';
     else if (pose && !pose.metric) text = 'scale unknown: no target was seen, sizes are relative';
     this.setNote(text);
   }
