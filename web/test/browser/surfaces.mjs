@@ -108,11 +108,12 @@ async function appear(context) {
   const { expert, check } = context;
   const note = expert.page.locator('.map3d .pane-note');
   const words = await note.innerText();
+  const there = (await triangles(context)) > 0; // a slow page has them at once
   const first = await whenTriangles(context, (count) => count > 0, 60_000);
   check(
     'until there are surfaces, words say when',
-    /surfaces appear where the camera has moved sideways/.test(words),
-    words,
+    there || /surfaces appear where the camera has moved sideways/.test(words),
+    there ? 'they were there first' : words,
   );
   const all = await whenTriangles(context, (count) => count >= LEAST_TRIANGLES, 60_000);
   check('surfaces appear', all.ms < Infinity, `${all.count} triangles, first after ${first.ms} ms`);
