@@ -58,6 +58,7 @@ enum class Action {
   kMessage,
   kVoice,
   kMute,
+  kShow,
   kTheme,
   kHelp,
   kEscape,

@@ -208,11 +208,16 @@ void Desk::Run(tools::Action action, Timestamp now_ns) {
     case kFollow:
       state_.following = !state_.following;
       return;
+    case kShow:
+      state_.shows = NextOf(state_.shows);
+      return;
     case kTop:
       held_ = true;
-      orbit_.FromTop();
-      return;
+      state_.from_above = !state_.from_above;
+      if (state_.from_above) return orbit_.FromTop();
+      [[fallthrough]];
     case kWholeMap:
+      state_.from_above = false;
       state_.following = false;
       if (const auto bounds = Bounds()) orbit_.LookAt(bounds->centre, bounds->radius_m);
       return;

@@ -12,6 +12,7 @@
 #include "client/tools/marks.hpp"
 #include "client/tools/selection.hpp"
 #include "client/view/layout.hpp"
+#include "client/view/surface_layer.hpp"
 #include "client/view/thing_desk.hpp"
 
 namespace saccade::view {
@@ -95,6 +96,8 @@ class DeskState {
   std::string pointed_id;
   std::optional<Hover> hover;
   Pane main = Pane::kMap;
+  MapShows shows = MapShows::kBoth;
+  bool from_above = false;  // the map was last looked at from above
   bool confirming_reset = false;
   tools::MarkFilter filter;
   bool hide_marks = false;

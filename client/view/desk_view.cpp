@@ -153,7 +153,7 @@ Marks DeskView::MarksIn(const tools::View& view) const {
 void DeskView::OnMap(const ImDrawList* /*list*/, const ImDrawCmd* command) {
   auto* self = static_cast<DeskView*>(command->UserCallbackData);
   self->scene_->Draw(self->eye_, self->viewport_, kFrustumShare * self->desk_.orbit().distance_m(),
-                     self->point_px_, *self->things_);
+                     self->point_px_, self->desk_.state().shows, *self->things_);
 }
 
 void DeskView::DrawMap(const Rect& rect, const Canvas& canvas, ImDrawList* list) {

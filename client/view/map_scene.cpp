@@ -190,7 +190,7 @@ void MapScene::BuildFrustum(const CameraModel& camera) {
 }
 
 void MapScene::Draw(const tools::View& eye, const Eigen::Vector4i& viewport, double frustum_m,
-                    float point_px, ThingLayer& things) {
+                    float point_px, MapShows shows, ThingLayer& things) {
   gl_.Viewport(viewport[0], viewport[1], viewport[2], viewport[3]);
   gl_.Scissor(viewport[0], viewport[1], viewport[2], viewport[3]);
   gl_.Enable(GL_SCISSOR_TEST);
@@ -206,7 +206,9 @@ void MapScene::Draw(const tools::View& eye, const Eigen::Vector4i& viewport, dou
   gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   const Eigen::Matrix4f clip_from_camera = ClipFromCamera(*eye.camera, 0.01, 1000);
   const Eigen::Matrix4f clip_from_world = clip_from_camera * MatrixOf(eye.camera_from_world);
-  surfaces_->Draw(clip_from_world, eye.world_from_camera.translation);
+  const bool surfaces = shows != MapShows::kDots && surfaces_->triangles() > 0;
+  const bool dots = shows != MapShows::kSurfaces || !surfaces;
+  if (surfaces) surfaces_->Draw(clip_from_world, eye.world_from_camera.translation);
   plain_->Use();
   plain_->Set("clip_from_model", clip_from_world);
   plain_->Set("point_px", point_px);
@@ -214,9 +216,9 @@ void MapScene::Draw(const tools::View& eye, const Eigen::Vector4i& viewport, dou
   grid_.Draw(GL_LINES);
   path_.Draw(GL_LINE_STRIP);
   things.edges().Draw(GL_LINES);
-  sigmas_.Draw(GL_LINES);
+  if (dots) sigmas_.Draw(GL_LINES);
   plain_->Set("round_points", 1);
-  points_.Draw(GL_POINTS);
+  if (dots) points_.Draw(GL_POINTS);
   if (picture_ != nullptr) DrawFrustum(clip_from_world, frustum_m);
   things.DrawMap(clip_from_camera, eye.world_from_camera);
 }

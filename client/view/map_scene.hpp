@@ -31,9 +31,9 @@ class MapScene {
 
   /// Draws into `viewport` (x, y from the bottom, width, height [framebuffer px]), clears it first.
   /// `eye`: a pinhole's; `frustum_m`: how far the picture lies before the camera. `things` come
-  /// last: known surfaces hide nothing of the map.
+  /// last: known surfaces hide nothing of the map. Where there are no surfaces dots are drawn.
   void Draw(const tools::View& eye, const Eigen::Vector4i& viewport, double frustum_m,
-            float point_px, ThingLayer& things);
+            float point_px, MapShows shows, ThingLayer& things);
 
  private:
   explicit MapScene(const GlFunctions& gl);

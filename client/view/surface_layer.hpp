@@ -14,6 +14,14 @@
 
 namespace saccade::view {
 
+/// What of the place the map shows.
+enum class MapShows { kBoth, kSurfaces, kDots };
+inline MapShows NextOf(MapShows shows) {
+  return shows == MapShows::kBoth       ? MapShows::kSurfaces
+         : shows == MapShows::kSurfaces ? MapShows::kDots
+                                        : MapShows::kBoth;
+}
+
 /// The place's surfaces in the map, in their own colours, lit a little from the eye so that shapes
 /// are seen. From behind they are darker. Lives on the thread of its OpenGL context, which must be
 /// current.

@@ -156,7 +156,8 @@ void Window::OnKey(int key, int scancode, int action, int mods) {
       {GLFW_KEY_ESCAPE, "escape"}, {GLFW_KEY_TAB, "tab"},
       {GLFW_KEY_ENTER, "enter"},   {GLFW_KEY_LEFT, "left"},
       {GLFW_KEY_RIGHT, "right"},   {GLFW_KEY_UP, "up"},
-      {GLFW_KEY_DOWN, "down"},     {GLFW_KEY_F2, "f2"}};
+      {GLFW_KEY_DOWN, "down"},     {GLFW_KEY_F2, "f2"},
+      {GLFW_KEY_F9, "f9"}};
   InputEvent event;
   event.kind = InputEvent::Kind::kKey;
   event.repeat = repeating_;

@@ -78,8 +78,6 @@ const std::vector<Setting>& Settings() {
       {"map", "--map", &Raw::map,
        "what was mapped before: last: looked for first | new: kept, not looked for | ID of one | "
        "none: neither (saccade maps list)"},
-      {"surfaces.cores", "--surface-cores", &Raw::surface_cores,
-       "how much of one processor surfaces of the place may take, 0 (none are made) to 1"},
       {nullptr, "--run-for", &Raw::run_for_s, "end after so many seconds"},
       {nullptr, "--sim-truth", &Raw::sim_truth, "JSON lines of the simulator's truth"},
       {nullptr, "--record", &Raw::record,
@@ -110,6 +108,8 @@ const std::vector<Setting>& Settings() {
       {"record.file_s", nullptr, &Raw::record_file_s, "and after so many seconds, 1 to 86400"},
       {"record.keep_free_mb", nullptr, &Raw::record_keep_free_mb,
        "a recording stops where less than so many MB of the disk are free"},
+      {"surfaces.cores", "--surface-cores", &Raw::surface_cores,
+       "how much of one processor surfaces of the place may take, 0 (none are made) to 1"},
       {"overlay.dots", nullptr, &Raw::overlay_dots,
        "the tracker's features in the augmented view, which is the wearer's"},
       {"overlay.axes", nullptr, &Raw::overlay_axes, "the world's axes in it"},

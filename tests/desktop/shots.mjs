@@ -40,7 +40,7 @@ export async function runShots(context) {
     screen.press('4');
     await sleep(500);
     shot('size-things');
-    screen.press('5'); // light
+    screen.press('F9'); // light
     screen.press('question');
     await sleep(700);
     shot('size-help-light');
@@ -49,7 +49,7 @@ export async function runShots(context) {
     screen.press('s');
     await sleep(700);
     shot('size-light');
-    screen.press('5');
+    screen.press('F9');
     await sleep(300);
     check(`the window of ${size}`, desktop.look().marks.length > 3, `${desktop.look().status}`);
     await desktop.stop();

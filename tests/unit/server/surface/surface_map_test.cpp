@@ -189,17 +189,18 @@ TEST(SurfaceMap, TrianglesFaceWhoSawThem) {
 }
 
 TEST(SurfaceMap, NeighbouringChunksShareTheirBorder) {
-  constexpr int kVoxel = 1760, kSide = 32;  // steps; voxels of a chunk
+  constexpr int kSide = 32;  // voxels of a chunk, which has one more on each side
+  const int voxel = TheMap().chunks().begin()->second->span / (kSide + 2);  // steps
   std::map<std::array<std::int64_t, 3>, int> chunks_with;
   std::vector<std::array<std::int64_t, 3>> border;  // in the layer that is the neighbour's
   for (const auto& [index, chunk] : TheMap().chunks()) {
     for (const auto& at : chunk->positions) {
       std::array<std::int64_t, 3> place;
       for (int i = 0; i < 3; ++i) {
-        place[i] = std::int64_t{index[i]} * kSide * kVoxel + at[i] - kVoxel;
+        place[i] = std::int64_t{index[i]} * kSide * voxel + at[i] - voxel;
       }
       ++chunks_with[place];
-      if (std::min({at[0], at[1], at[2]}) < kVoxel) border.push_back(place);
+      if (std::min({at[0], at[1], at[2]}) < voxel) border.push_back(place);
     }
   }
   std::size_t shared = 0;
