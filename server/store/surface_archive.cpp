@@ -56,7 +56,8 @@ std::shared_ptr<const SurfaceSnapshot> DecodeSurface(absl::string_view bytes) {
   for (SurfaceChunk& chunk : chunks) {
     Fields(reader, chunk);
     if (!reader.ok()) return nullptr;
-    surface->chunks[chunk.index] = std::make_shared<const SurfaceChunk>(std::move(chunk));
+    const SurfaceChunk::Index index = chunk.index;
+    surface->chunks[index] = std::make_shared<const SurfaceChunk>(std::move(chunk));
   }
   if (!reader.ok() || !reader.at_end()) return nullptr;
   return surface;
