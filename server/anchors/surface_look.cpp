@@ -79,8 +79,8 @@ std::vector<SurfaceSample> SurfaceAround(const SurfaceSnapshot& surface,
 
 void DoubtHole(const SurfaceDepth& depth, DepthDoubt& doubt) {
   if (depth.at_feature) return;
-  doubt.relief_sigma_m = std::max(doubt.relief_sigma_m, kHoleShare * depth.depth_m);
-  doubt.clutter_sigma_m = std::max(doubt.clutter_sigma_m, doubt.relief_sigma_m);
+  // A patch at the very pixel, once it is measured, knows better: that is `relief`.
+  doubt.clutter_sigma_m = std::max(doubt.clutter_sigma_m, kHoleShare * depth.depth_m);
 }
 
 void TakeSurface(const SurfaceLook& look, SurfaceDepth& depth, DepthDoubt& doubt) {
