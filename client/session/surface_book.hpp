@@ -12,8 +12,6 @@ class SurfaceBook {
   const SurfaceSnapshot& surface() const { return surface_; }
   /// Rises with every change.
   std::uint64_t changes() const { return changes_; }
-  /// False: this server makes none.
-  bool any() const { return surface_.edition != 0; }
 
  private:
   SurfaceSnapshot surface_;

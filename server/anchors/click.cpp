@@ -181,8 +181,9 @@ absl::StatusOr<ResolvedTarget> ResolvePixel(const PixelTarget& target, const Fra
     resolved.feature = ids[*depth->at_feature];
   }
   resolved.normal_in_world =
-      look ? look->normal_in_world
-           : Eigen::Vector3d(ray_from_world.rotation.conjugate() * depth->normal_in_ray);
+      look && !look->outline
+          ? look->normal_in_world
+          : Eigen::Vector3d(ray_from_world.rotation.conjugate() * depth->normal_in_ray);
   resolved.view = ResolvedTarget::View{std::move(cast->past), world_from_camera, target.pixel,
                                        depth->depth_m, depth->sigma_m};
   return resolved;
@@ -255,8 +256,9 @@ absl::StatusOr<ResolvedTarget> ResolveRay(const RayTarget& target, const MapView
     resolved.feature = ids[*depth->at_feature];
   }
   resolved.normal_in_world =
-      look ? look->normal_in_world
-           : Eigen::Vector3d(ray_from_world.rotation.conjugate() * depth->normal_in_ray);
+      look && !look->outline
+          ? look->normal_in_world
+          : Eigen::Vector3d(ray_from_world.rotation.conjugate() * depth->normal_in_ray);
   return resolved;
 }
 

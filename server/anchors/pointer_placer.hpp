@@ -20,7 +20,8 @@ namespace saccade {
 
 /// Where pointers point: targets to points in the newest map, from its snapshot and without a word
 /// to the tracker. A pixel is resolved as a click is, by its frame's pose, but by features alone: a
-/// pointer is gone in a second. Any thread; 0.1 ms a point in a map of 1000 landmarks.
+/// pointer is gone in a second. Any thread; 0.1 ms a point in a map of 1000 landmarks, and as
+/// many looks at the surfaces as a click takes.
 class PointerPlacer {
  public:
   PointerPlacer(FrameLookup frames, AnchorOptions options)

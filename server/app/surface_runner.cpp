@@ -94,7 +94,7 @@ std::shared_ptr<const SurfaceSnapshot> SurfaceRunner::newest() const {
   return newest_;
 }
 
-bool SurfaceRunner::TakeNews() {
+void SurfaceRunner::TakeNews() {
   std::deque<KeyframeSeen> seen;
   std::shared_ptr<const KeyframePlaces> places;
   std::shared_ptr<const SurfaceSnapshot> restored;
@@ -109,7 +109,6 @@ bool SurfaceRunner::TakeNews() {
     if (map_->Wants(one.frame->id, *one.places)) map_->Add(*one.frame, *one.places);
   }
   if (places) map_->SetPlaces(*places);
-  return !seen.empty() || places;
 }
 
 void SurfaceRunner::Publish() {

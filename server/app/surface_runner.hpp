@@ -55,8 +55,7 @@ class SurfaceRunner {
 
   SurfaceRunner(const SurfaceRunnerOptions& options, std::unique_ptr<SurfaceMap> map);
   void Run(std::stop_token stop);
-  /// False: nothing is to be done.
-  bool TakeNews();
+  void TakeNews();
   void Publish();
   void Rest(const std::stop_token& stop, double worked_ms);
 

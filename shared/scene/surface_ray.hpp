@@ -14,7 +14,7 @@ struct SurfaceHit {
 };
 
 /// The nearest triangle that the ray meets, from either side, beyond `nearest`; nothing: a hole.
-/// `ray_in_world`: unit. Some ten microseconds: boxes first, then the triangles of a few chunks.
+/// `ray_in_world`: unit. Boxes first, then the triangles of the chunks that it passes.
 std::optional<SurfaceHit> CastOnSurface(const SurfaceSnapshot& surface,
                                         const Eigen::Vector3d& origin_in_world,
                                         const Eigen::Vector3d& ray_in_world, double nearest = 0.0);

@@ -8,7 +8,7 @@
 /// Pieces of surface to and from messages (docs/design/surfaces.md).
 namespace saccade::wire {
 
-/// Coded: some tenth of a millisecond. Corners may come in another order.
+/// Corners may come in another order.
 v1::SurfaceChunk ToProto(const SurfaceChunk& chunk);
 
 /// InvalidArgument: more corners or triangles than a chunk can have, a code that ends early or
